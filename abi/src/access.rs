@@ -37,7 +37,7 @@ pub(crate) struct PointStart<const N: usize, S> {
 }
 
 impl<'a, const PACKED: bool> Access<'a, PACKED> {
-    /// A batch that has been checked, of points with so many components.
+    /// A batch that has been checked, of points with this many components.
     pub(crate) fn new(batch: &'a Batch, n_components: usize) -> Self {
         Self {
             batch,
@@ -171,7 +171,7 @@ pub struct Directions<'a> {
 }
 
 impl<'a> Directions<'a> {
-    /// Rates that have been checked, of a law with so many parameters.
+    /// Rates that have been checked, of a law with this many parameters.
     ///
     /// # Safety
     /// `parameter` is null or holds that many values as long as the rates live.

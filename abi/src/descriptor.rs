@@ -76,7 +76,7 @@ impl Hypothesis {
     }
 }
 
-/// What a law is called and where it comes from. Made by [`describe!`](crate::describe).
+/// Name and origin of a law. Made by [`describe!`](crate::describe).
 #[derive(Clone, Copy, Debug)]
 pub struct Description {
     /// Identifier `[a-z][a-z0-9_]*`, public interface.
@@ -154,7 +154,7 @@ impl InternalVariables for () {
 }
 
 /// Declares the parameters of a law: a struct of numbers whose doc comments, units and bounds are
-/// also what the host checks and prints. A table may include another, whose parameters then stand in
+/// also what the host checks and prints. A table may include another, whose parameters then are in
 /// its place.
 ///
 /// ```

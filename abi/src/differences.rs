@@ -50,7 +50,7 @@ mod tests {
         ]
     }
 
-    /// Where the size is right, and where it is ten times too large or too small.
+    /// Correct size, and sizes ten times too large or too small.
     #[test]
     fn smooth_responses_are_differentiated_to_eight_digits() {
         for increment in [[0.0; 2], [1e-9, -2e-9], [5e-4, -3e-4], [1e-3, 2e-3]] {

@@ -401,7 +401,7 @@ pub struct InterfaceEnd<S, T> {
 /// A law for interfaces in two dimensions that is written for any number. [`ByDuals`] makes an
 /// [`InterfaceLaw`] of it.
 pub trait DualInterfaceLaw: Sized + Send + Sync + 'static {
-    /// What the law is called.
+    /// Name of the law.
     const DESCRIPTION: Description;
     /// The tangent is symmetric in every state.
     const SYMMETRIC: bool = false;
@@ -678,7 +678,7 @@ mod tests {
         }
     }
 
-    /// At 0 a root has no derivative, but a number that does not change has none to lose.
+    /// At 0 a root has no derivative, but a constant does not need one.
     #[test]
     #[expect(clippy::float_cmp, reason = "zeros are exact")]
     fn constants_stay_constant_where_a_derivative_is_infinite() {

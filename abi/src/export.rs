@@ -125,7 +125,7 @@ impl<T> Shared<T> {
         Self(value)
     }
 
-    /// Where the description stands.
+    /// Place of the description.
     pub const fn as_ptr(&self) -> *const T {
         &raw const self.0
     }

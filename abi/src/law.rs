@@ -12,7 +12,7 @@ use std::fmt;
 pub struct Refusal {
     /// Identifier of the parameter to change.
     pub parameter: &'static str,
-    /// What is wrong with it, value before bound.
+    /// The defect, value before bound.
     pub reason: String,
 }
 
@@ -59,10 +59,10 @@ impl Failure {
     }
 }
 
-/// Which operator the host wants beside the update.
+/// Which operator the host wants next to the update.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tangent {
-    /// None: leave the matrix as it is.
+    /// None: leave the matrix unchanged.
     None,
     /// The elastic operator in the end state.
     Elastic,
@@ -70,7 +70,7 @@ pub enum Tangent {
     Consistent,
 }
 
-/// What a law has for a consistent tangent.
+/// Kind of consistent tangent of a law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HasTangent {
     /// The derivative of the update.
@@ -165,15 +165,15 @@ impl<S, const N: usize> InterfaceResponse<S, N> {
 /// and traction are in use.
 #[derive(Clone, Copy, Debug)]
 pub struct InterfaceRates<'a, S> {
-    /// Of the parameters, in declared order; none: all zero.
+    /// Rates of the parameters, in declared order; empty: all zero.
     pub parameter: Option<&'a [f64]>,
-    /// Of the jump at the start.
+    /// Rate of the jump at the start.
     pub jump: [f64; 2],
-    /// Of its increment.
+    /// Rate of its increment.
     pub jump_increment: [f64; 2],
-    /// Of the traction at the start.
+    /// Rate of the traction at the start.
     pub traction: [f64; 2],
-    /// Of the internal variables at the start.
+    /// Rates of the internal variables at the start.
     pub state: S,
 }
 

@@ -6,7 +6,7 @@
 //! later, and walks an array of such structs with the stride of its first element's `struct_size`.
 //! The views never change.
 //!
-//! Strings are UTF-8, NUL-terminated, static and never null unless a field says so.
+//! Strings are UTF-8, NUL-terminated, static and never null unless a field reports it.
 
 use std::ffi::{c_char, c_void};
 
@@ -100,7 +100,7 @@ pub struct Parameter {
     pub id: *const c_char,
     /// Symbol in the literature.
     pub symbol: *const c_char,
-    /// Unit; `-` where there is none, `deg` for angles.
+    /// Unit; `-` where absent, `deg` for angles.
     pub unit: *const c_char,
     /// One sentence.
     pub doc: *const c_char,
@@ -174,7 +174,7 @@ pub struct Formulation {
     pub gradient: *const Variable,
     /// Fluxes.
     pub flux: *const Variable,
-    /// Internal variables; may be null if there are none.
+    /// Internal variables; may be null if absent.
     pub state: *const Variable,
 }
 /// The tangent is symmetric in every state.
@@ -186,8 +186,7 @@ pub const PILUM_T_LINEAR: u32 = 1 << 1;
 pub const PILUM_T_LOCAL_AXES: u32 = 1 << 2;
 /// Offers rates, [`PILUM_REQ_RATES`]. Since 1.1.
 pub const PILUM_T_RATES: u32 = 1 << 3;
-/// What it gives as its consistent tangent is near the derivative of the update, but not equal to
-/// it. Since 1.1.
+/// Its consistent tangent is close to the derivative of the update, but not equal to it. Since 1.1.
 pub const PILUM_T_TANGENT_APPROXIMATE: u32 = 1 << 4;
 /// Offers the elastic operator only; asked for the consistent tangent, it answers
 /// [`PILUM_E_UNSUPPORTED`]. Since 1.1.
@@ -357,7 +356,7 @@ pub struct Law {
     pub doc: *const c_char,
     /// Sources.
     pub references: *const c_char,
-    /// Parameters; may be null if there are none.
+    /// Parameters; may be null if absent.
     pub parameter: *const Parameter,
     /// Formulations.
     pub formulation: *const Formulation,

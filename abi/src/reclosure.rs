@@ -23,7 +23,7 @@ impl InContact {
         }
     }
 
-    /// What is left of an increment Δ⟦u⟧ after it has closed a gap g > 0. The path within the increment
+    /// The rest of an increment Δ⟦u⟧ after it has closed a gap g > 0. The path within the increment
     /// is straight, so contact re-forms at the fraction −g/`Δ[u_n]` of it, where `g + Δ[u_n]` of the
     /// opening and `f = 1 + g/Δ[u_n]` of the slip are left; ∂f/∂`[u_n]` = −g/`Δ[u_n]²`.
     ///

@@ -368,7 +368,7 @@ fn exports(library: &Path) -> Outcome<Vec<String>> {
     Ok(names)
 }
 
-/// The program named by the variable, or else `default`; `None`, with a remark, if there is none.
+/// The program named by the variable, or else `default`; `None`, with a remark, if absent.
 /// Where `PILUM_REQUIRE_ALL` or `CI` is set, a missing compiler is a failure.
 fn compiler(variable: &str, default: &str) -> Option<String> {
     let name = env::var(variable).unwrap_or_else(|_| default.to_owned());
@@ -522,7 +522,7 @@ fn position(item: &str, source: &str, renames: &HashMap<String, String>) -> Opti
 }
 
 /// An item in C's words: types by their C names, no links, no letters beyond ASCII, and numbers
-/// that can stand in any expression.
+/// that can be in any expression.
 fn plain(item: &str, renames: &HashMap<String, String>) -> String {
     let mut text = item.to_owned();
     for (from, to) in [

@@ -29,7 +29,7 @@ fn case(name: &str, variant: Option<&str>) -> Case {
     cases.pop().expect("the variant is there")
 }
 
-/// Of every degree of freedom, whether it is held or the head's push prescribes it.
+/// For every degree of freedom, whether it is held or the head's push prescribes it.
 fn prescribed(case: &Case, mesh: &Mesh) -> Vec<bool> {
     let mut prescribed = vec![false; 2 * mesh.nodes.len()];
     let supports = case.file.supports.iter();

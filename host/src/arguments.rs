@@ -12,7 +12,7 @@ pub(crate) struct Arguments {
     /// Open libraries that are not known yet without trying them in a child process first.
     #[arg(long, global = true)]
     pub(crate) no_probe: bool,
-    /// Call laws in processes of their own, so that one that crashes ends the increment and not the
+    /// Call laws in separate processes, so that one that crashes ends the increment and not the
     /// program; a call may take this many seconds.
     #[arg(
         long,
@@ -92,7 +92,7 @@ pub(crate) enum Command {
         /// Folder for the results [default: results/STUDY].
         #[arg(long)]
         out: Option<PathBuf>,
-        /// So many runs at a time, each in a process of its own [default: one for each processor].
+        /// So many runs at a time, each in a separate process [default: one for each processor].
         #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
         jobs: Option<u16>,
         /// Check everything, write the table of runs and carry out none, whatever `--jobs` and `--retry` say.
@@ -120,7 +120,7 @@ pub(crate) enum Command {
         /// Results folders.
         #[arg(required = true)]
         folders: Vec<PathBuf>,
-        /// The report's file [default: report.html in the folder, or beside the folders].
+        /// The report's file [default: report.html in the folder, or next to the folders].
         #[arg(long)]
         out: Option<PathBuf>,
     },
@@ -184,7 +184,7 @@ pub(crate) enum Command {
         #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
         threads: Option<u16>,
     },
-    /// Check whether a library keeps the contract; each check runs in a process of its own.
+    /// Check whether a library keeps the contract; each check runs in a separate process.
     Check(workshop::check::Arguments),
     /// List the laws found, or show all about one of them.
     Laws {
@@ -208,7 +208,7 @@ pub(crate) enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Write the libraries that a case or driver uses, with their SHA-256, to a lock file beside it.
+    /// Write the libraries that a case or driver uses, with their SHA-256, to a lock file next to it.
     Lock {
         /// A case file, a folder with `case.toml`, or a driver file.
         input: PathBuf,
@@ -220,7 +220,7 @@ pub(crate) enum Command {
         /// Write all arguments of the call, that of a UMAT, to this file, before and after it.
         #[arg(long, value_name = "FILE")]
         record: Option<PathBuf>,
-        /// Call the law in this process, for a debugger, and not in one of its own.
+        /// Call the law in this process, for a debugger.
         #[arg(long, conflicts_with = "isolate")]
         in_process: bool,
     },
@@ -255,7 +255,7 @@ pub(crate) enum Command {
 
 impl Command {
     /// Whether it calls laws in its own process, which they may end; and whether that may be done
-    /// once more with laws in processes of their own.
+    /// once more with laws in separate processes.
     pub(crate) fn calls_laws(&self) -> Option<bool> {
         match self {
             // What came through a pipe comes only once.
@@ -283,7 +283,7 @@ impl Command {
     }
 }
 
-/// What a schema is of.
+/// Kind of file of a schema.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum File {
     /// Case files, for `pilum run`.

@@ -1,4 +1,4 @@
-//! What each command does: calls of the rooms, and what they say.
+//! The commands: calls of the rooms, and their output.
 
 mod cases;
 mod studies;
@@ -272,8 +272,8 @@ fn check_recording(cases: &[Case]) -> Result<(), Error> {
     Err(Error::usage(message))
 }
 
-/// Who asks the work to stop: the process that watches this one; where none does, Ctrl-C and its
-/// like, and a second one ends the program at once.
+/// Source of requests to stop: the process that watches this one, or else Ctrl-C and similar
+/// signals; a second one ends the program at once.
 fn stop_on_signals() -> Result<Stop, Error> {
     if let Some(stop) = supervision::stop() {
         return Ok(stop);
@@ -293,7 +293,7 @@ fn stop_on_signals() -> Result<Stop, Error> {
     Ok(stop)
 }
 
-/// What starting a thread takes is memory, above all.
+/// Starting a thread mostly needs memory.
 pub(crate) fn cannot_start(what: &str, why: &impl std::fmt::Display) -> Error {
     #[cfg(unix)]
     let message = runs::memory::cannot_start(what, why);

@@ -105,8 +105,8 @@ fn watched(again: bool) -> Option<ExitCode> {
     })
 }
 
-/// The exit code, after the message. What a command came to matters more than that not all could be
-/// said of it.
+/// The exit code, after the message. The outcome of a command matters more than an incomplete
+/// message.
 fn ended(outcome: Result<(), Error>) -> ExitCode {
     let outcome = outcome.and(say::what_was_not_said().map_or(Ok(()), Err));
     let code = match outcome.map_err(named_shortage) {

@@ -6,7 +6,7 @@ use std::io::Write as _;
 use std::sync::{Mutex, PoisonError};
 
 /// A line on the error stream, written at once: that stream has no buffer. That it cannot be written does not
-/// end a run, but is said of it in the end.
+/// end a run, but is reported of it in the end.
 macro_rules! say {
     ($($text:tt)*) => {
         $crate::say::line(format!($($text)*))
@@ -64,7 +64,7 @@ impl Output {
         self.text(&format!("{text}\n"));
     }
 
-    /// How the command ends: what it came to matters more than what could not be said of it.
+    /// How the command ends: what it came to matters more than what could not be reported of it.
     /// Whoever reads a pipe may have read enough.
     pub(crate) fn end(self, outcome: Result<(), Error>) -> Result<(), Error> {
         let is_read = |why: &std::io::Error| why.kind() == std::io::ErrorKind::BrokenPipe;

@@ -9,9 +9,9 @@ use rayon::{ThreadBuilder, ThreadPoolBuilder};
 use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Grids of so many elements are small: elements are shared in pieces as large.
+/// Grids of this many elements are small: elements are shared in pieces as large.
 const SMALL: usize = 256;
-/// What is not done by then is work for all threads, however small it looks.
+/// Work that is not done by then is for all threads, however small it looks.
 const LONG: Duration = Duration::from_millis(100);
 
 // Of the whole process by nature: these are its threads.
@@ -21,7 +21,7 @@ static WAITING: Mutex<Vec<ThreadBuilder>> = Mutex::new(Vec::new());
 /// Since when.
 static SINCE: OnceLock<Instant> = OnceLock::new();
 
-/// Has so many threads, or as many as there are processors, wait until they are told to [`begin`]. Until then the
+/// Has this many threads, or all processors, wait until they are told to [`begin`]. Until then the
 /// one that calls this does everything alone.
 pub(crate) fn gather(n: Option<u16>) -> Result<(), Error> {
     SINCE.get_or_init(Instant::now);

@@ -288,7 +288,7 @@ fn all_languages_refuse_alike() {
     }
 }
 
-/// Exceptions stop at the boundary, are said to be the law's, and the law is not called again.
+/// Exceptions stop at the boundary, are reported to be the law's, and the law is not called again.
 #[test]
 fn an_exception_is_a_defect_of_the_law() {
     let folder = TempDir::new().unwrap();

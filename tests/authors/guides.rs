@@ -1,5 +1,5 @@
 //! `pilum new-law` in every language and kind: the commands of the README that a project carries are
-//! run as they stand there, and all languages give the same, which is the closed form.
+//! run as they are there, and all languages give the same, which is the closed form.
 
 use crate::compilers::repository;
 use crate::program::{pilum, shell};

@@ -1,4 +1,4 @@
-//! What the helpers for C, C++ and Fortran offer beside one law with internal variables: several laws
+//! What the helpers for C, C++ and Fortran offer next to one law with internal variables: several laws
 //! in a library, laws without parameters or internal variables, choices, optional parameters,
 //! initial values, and what happens with more internal variables than they have room for.
 

@@ -46,7 +46,7 @@ fn a_page_shows_choices_and_optional_parameters() {
     }
 }
 
-/// What the page of a law says can be put into a file and read, once numbers are filled in.
+/// The block on the page of a law can be put into a file and read, once numbers are filled in.
 #[test]
 fn the_example_of_a_page_can_be_pasted() {
     let page = run(&["laws", "coulomb_joint"]).stdout;

@@ -1,4 +1,4 @@
-//! What CI leaves out: tests that take minutes are run by `tests/release.sh`, and `CONTRIBUTING.md` says
+//! Tests that CI leaves out: tests that take minutes are run by `tests/release.sh`, and `CONTRIBUTING.md` says
 //! when they were. Everything else runs always, or says what it lacks.
 
 use crate::compilers::repository;
@@ -72,7 +72,7 @@ fn tests_left_out_are_found() {
     assert_eq!(left_out(&text), ["b", "c"]);
 }
 
-/// Compilers have tests of their own like this one, where they are used.
+/// Compilers have their own tests like this one, where they are used.
 #[test]
 fn a_missing_compiler_is_named() {
     let test = "foreign::an_exception_is_a_defect_of_the_law";

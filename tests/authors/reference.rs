@@ -77,7 +77,7 @@ impl Schema {
         choices.filter_map(label).collect()
     }
 
-    /// What a key takes, in words.
+    /// Values of a key, in words.
     fn kind(&self, value: &Value, places: &BTreeMap<String, String>) -> String {
         if let Some(name) = Self::named(value) {
             if let Some(place) = places.get(name) {
@@ -213,7 +213,7 @@ fn marks(text: &str, kind: &str) -> Vec<(usize, String)> {
         .collect()
 }
 
-/// The page with what stands between its marks written anew.
+/// The page with what stands between its marks written again.
 fn filled(text: &str, kind: &str, content: impl Fn(&str) -> String) -> String {
     let (mut page, mut rest) = (String::new(), text);
     let begin = format!("<!-- {kind} of ");
@@ -244,7 +244,7 @@ fn bless(path: &Path, text: &str) {
     }
 }
 
-/// Where each table stands: the heading above its mark.
+/// Place of each table: the heading above its mark.
 fn places(file: &str, text: &str) -> BTreeMap<String, String> {
     let mut heading = "";
     let mut places = BTreeMap::new();
@@ -337,7 +337,7 @@ fn every_key_has_an_example() {
     }
 }
 
-/// Each example is a file of its own, based on `example.toml` of its page if it has no name.
+/// Each example is its own file, based on `example.toml` of its page if it has no name.
 #[test]
 fn every_example_runs() {
     let runs = [

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// Of every room the rooms that it stands on.
+/// For every room the rooms that it is on.
 type Arrows = BTreeMap<String, BTreeSet<String>>;
 
 fn root() -> &'static Path {
@@ -21,7 +21,7 @@ fn quoted(cell: &str) -> BTreeSet<String> {
     parts.map(str::to_owned).collect()
 }
 
-/// The table of `host/README.md`: room, and what it stands on.
+/// The table of `host/README.md`: room, and what it is on.
 fn drawn(page: &str) -> Arrows {
     let rows = page
         .lines()
@@ -72,7 +72,7 @@ fn the_drawing_is_what_is_built() {
     assert_eq!(drawn(&read("host/README.md")), built());
 }
 
-/// Every row stands below those that it stands on: `cargo` forbids a circle, this a row out of place.
+/// Every row stands below those that it is on: `cargo` forbids a circle, this a row out of place.
 #[test]
 fn the_table_goes_one_way() {
     let page = read("host/README.md");
@@ -86,7 +86,7 @@ fn the_table_goes_one_way() {
     }
 }
 
-/// The contract stands on nothing of ours, and what imitates other programs on the contract alone.
+/// The contract is on nothing of ours, and what imitates other programs on the contract alone.
 #[test]
 fn the_contract_stands_alone() {
     let ours = |manifest: &str| -> BTreeSet<String> {
@@ -123,7 +123,7 @@ fn features(of: &[&str]) -> Option<BTreeSet<String>> {
 }
 
 /// A crate that one command builds with other features than another is compiled once for each of them, and all that
-/// stands on it.
+/// is on it.
 #[test]
 fn what_is_built_for_the_program_serves_all() {
     let all = features(&["--workspace"]).unwrap();

@@ -1,4 +1,4 @@
-//! What is built into the program, and where it may break the rules of memory: licences and sources
+//! Crates built into the program, and code that may break the rules of memory: licences and sources
 //! of all crates as `deny.toml` wants them, and `unsafe` where it may live, counted.
 
 use serde_json::Value;
@@ -7,7 +7,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Where `unsafe` may stand, and what for. A folder has the name of the file it belongs to.
+/// Places that may have `unsafe`, and their purpose. A folder has the name of the file it belongs to.
 const UNSAFE: [(&str, &str); 11] = [
     ("abi/src/raw.rs", "types of C functions"),
     (

@@ -6,7 +6,7 @@
 //!             (derivative, differences, elastic operator, none), between two blocks, pressed and pushed
 //!             into slip with dilatancy
 //! Asserts     the same shear traction to the tolerance of the solver in at most half as many iterations
-//!             again as with the derivative; what is said of what a law declares; `pilum check` passes
+//!             again as with the derivative; what is reported of what a law declares; `pilum check` passes
 
 use crate::compilers::{library, repository};
 use crate::program::pilum;
@@ -184,7 +184,7 @@ fn every_kind_of_tangent_is_solved() {
     }
 }
 
-/// Texts, and what stands there instead.
+/// Texts, and what is there instead.
 type Edits = &'static [(&'static str, &'static str)];
 
 /// A joint of 1e5 kPa/m that calls every update unreliable, its tangent by differences.

@@ -31,7 +31,7 @@ impl Validator {
         self.errors(value).is_empty()
     }
 
-    /// What is wrong, and where.
+    /// The defect, and its place.
     pub(crate) fn errors(&self, value: &Value) -> Vec<String> {
         let mut errors = Vec::new();
         self.check(&self.0, value, "", &mut errors);

@@ -1,7 +1,7 @@
 //! Intervals hold the true value as often as they say.
 //!
 //! Curves are computed by the law itself and scattered by normal noise of a known size, 200 times. Of
-//! 200 intervals of 95 % so many hold the truth as the binomial distribution lets; its bounds leave out
+//! 200 intervals of 95 % this many hold the truth as the binomial distribution lets; its bounds leave out
 //! one repetition of the test in a thousand on either side.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
@@ -30,7 +30,7 @@ impl Noise {
     }
 }
 
-/// Hits of so many at this probability that only one repetition in a thousand goes beyond.
+/// Hits of this many at this probability that only one repetition in a thousand goes beyond.
 pub(crate) fn at_most(n: usize, p: f64) -> usize {
     let mut chance = (1.0 - p).powi(n as i32);
     let mut sum = chance;

@@ -346,7 +346,7 @@ const ROUGH: &str = "analysis = \"plane_strain\"\nmesh.columns = [{ n = 1, to = 
     [[phase]]\nname = \"load\"\nincrements = 2\npressure = [{ line = \"top\", value = 100.0 }]\n\
     [probes]\np = { line = \"base\", quantity = \"reaction_y\" }\nw = { line = \"top\", quantity = \"displacement_y\", scale = -1000.0 }\n";
 
-/// Each test is known to its own exactness: a rough case beside a driver makes nothing of that less known.
+/// Each test is known to its own exactness: a rough case next to a driver makes nothing of that less known.
 #[test]
 fn a_rough_case_blinds_no_other_test() {
     let boxes = Boxes::new(0.3);

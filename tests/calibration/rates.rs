@@ -180,7 +180,7 @@ fn first_segment(values: [f64; 4], column: &str, x: &[f64]) -> Vec<f64> {
     computed(&first.join("[[segment]]"), ["u_t", column], x)
 }
 
-/// Where a flux is led the horizontal axis itself moves with the parameters.
+/// If a flux is prescribed, the horizontal axis itself moves with the parameters.
 #[test]
 fn rates_follow_through_segments_of_led_flux() {
     let place = TempDir::new().unwrap();

@@ -1,4 +1,4 @@
-//! Systematic errors of measured curves are said aloud, and cured by an offset or a scale that is looked for; honest noise
+//! Systematic errors of measured curves are reported aloud, and cured by an offset or a scale that is looked for; honest noise
 //! is left alone.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 

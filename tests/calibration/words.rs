@@ -1,4 +1,4 @@
-//! What tests do not tell is said in words.
+//! Parameters that tests do not determine are reported in words.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use crate::{computed, run, write_points};

@@ -49,7 +49,7 @@ fn a_bored_pile_settles_alike_on_two_meshes() {
     );
 }
 
-/// The bored pile on 8 × 15 elements, pushed to 0.1 D in so many increments.
+/// The bored pile on 8 × 15 elements, pushed to 0.1 D in this many increments.
 fn pushed(control: &str, increments: u32) -> (usize, f64) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../cases/bored_pile/case.toml");
     let mut text = std::fs::read_to_string(path).unwrap();

@@ -429,7 +429,7 @@ fn a_folder_with_earlier_results() {
     assert!(!place.path("run/report.html").exists());
 }
 
-/// Points beyond the computed ones are left out, and that is said.
+/// Points beyond the computed ones are left out, and that is reported.
 #[test]
 fn points_that_are_not_computed_are_left_out() {
     let place = place();

@@ -6,7 +6,7 @@
 use crate::program::{DONE, Outcome, PLUGIN_TROUBLE, Place};
 use crate::troubled;
 
-/// A way, and what is said of it once the law is in a process of its own.
+/// A way, and what is reported of it once the law is in a separate process.
 const WAYS: [(&str, &str); 6] = [
     ("exit", "ended its process: exit code 0"),
     ("quiet_exit", "ended its process: exit code 0"),

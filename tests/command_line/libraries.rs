@@ -1,4 +1,4 @@
-//! Law libraries that are missing, or are none.
+//! Law libraries that are missing or invalid.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use crate::program::{CASE, PLUGIN_TROUBLE, Place, refuses};

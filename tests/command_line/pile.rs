@@ -744,7 +744,7 @@ fn what_is_odd_about_a_pile_is_said_before_it_is_loaded() {
 }
 
 /// The picture of the test begins where the test does: at the state that the phase before it left, or
-/// at its own zero where settlements are counted anew.
+/// at its own zero where settlements are counted again.
 #[test]
 fn the_curve_of_a_test_begins_where_the_phase_before_it_ended() {
     let (before, rest) = PILE.split_once("[[phase]]\nname = \"pull\"").unwrap();

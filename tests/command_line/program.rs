@@ -1,4 +1,4 @@
-//! Running the program in a folder of its own, and tables of mistakes in a small case.
+//! Running the program in its own folder, and tables of mistakes in a small case.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use std::path::{Path, PathBuf};
@@ -96,7 +96,7 @@ pub(crate) const JOINT: &[Edit] = &[
     ),
 ];
 
-/// A text that occurs in the case, and what stands there instead.
+/// A text that occurs in the case, and what is there instead.
 pub(crate) type Edit = (&'static str, &'static str);
 
 /// The case after some edits.
@@ -231,7 +231,7 @@ impl Place {
     }
 }
 
-/// The program beside the folder of the test executables.
+/// The program next to the folder of the test executables.
 fn program(deps: &Path) -> PathBuf {
     let name = format!("pilum{}", std::env::consts::EXE_SUFFIX);
     let path = deps.parent().unwrap().join(name);

@@ -1,4 +1,4 @@
-//! What is printed and written, by runs that end well and by others.
+//! Output of runs that succeed and of others.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use crate::program::{BAD_INPUT, CASE, DONE, NO_EQUILIBRIUM, Place, edited};

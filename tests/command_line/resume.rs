@@ -10,7 +10,7 @@ use tests::case::column;
 /// Increments of each of the two phases.
 const INCREMENTS: usize = 60;
 
-/// The block beside a layer in many increments, the layer's strength reached, the law's
+/// The block next to a layer in many increments, the layer's strength reached, the law's
 /// parameters swapped between the phases, everything written that can be.
 fn long_case(solver: &str) -> String {
     let swapped = "[laws.weak]\nlaw = \"coulomb_joint\"\n[laws.weak.parameters]\n\

@@ -3,7 +3,7 @@
 use crate::program::{DONE, Place};
 use std::time::{Duration, Instant, SystemTime};
 
-/// The chamber in so many increments that it takes some seconds.
+/// The chamber in this many increments that it takes some seconds.
 fn place() -> Place {
     let place = Place::new();
     let chamber = include_str!("../../cases/chamber_mesh1/case.toml");

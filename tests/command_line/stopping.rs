@@ -13,7 +13,7 @@ const STOPPED: i32 = 130;
 /// A request is answered within one iteration or 2 s; the rest is for a busy machine.
 const BOUND: Duration = Duration::from_secs(8);
 
-/// Starts the program in a group of its own, as a shell does, with its messages in a file.
+/// Starts the program in its own group, as a shell does, with its messages in a file.
 fn start(place: &Place, arguments: &[&str]) -> Child {
     let said = std::fs::File::create(place.path("said")).unwrap();
     let mut command = place.command(arguments);

@@ -122,7 +122,7 @@ fn devices_and_endless_files_are_no_input() {
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
 }
 
-/// Whatever the limit, memory that runs out is said with how much is needed, the summary says that
+/// Whatever the limit, memory that runs out is reported with how much is needed, the summary says that
 /// the run has stopped, and the rows that were written are whole; with libraries that were tried before
 /// and with those that are tried within the limit.
 #[test]

@@ -227,7 +227,7 @@ fn the_table_does_not_depend_on_who_carries_it_out() {
     assert!(scattered.path("out/report.html").is_file());
 }
 
-/// Chance has the same points at every call; `saltelli` has the runs for indices, which stand in `effects.csv`. The
+/// Chance has the same points at every call; `saltelli` has the runs for indices, which are in `effects.csv`. The
 /// stiffness of the layer brings everything, the title nothing.
 #[test]
 fn saltelli_gives_indices_with_intervals() {
@@ -513,7 +513,7 @@ fn runs_that_fail_are_rows_with_their_reason() {
     assert_eq!(study(&place, &["--run", "2"]).code, Some(NO_EQUILIBRIUM));
 }
 
-/// What a run has passed counts, whatever comes later; a grid with a hole has no η².
+/// Rows that a run has passed count, whatever comes later; a grid with a hole has no η².
 #[test]
 fn of_a_run_that_fails_counts_what_it_has_passed() {
     let place = Place::new();
@@ -568,7 +568,7 @@ fn an_emptied_history_is_carried_out_again() {
     }
 }
 
-/// Its library was built once more: a run that is done is not called failed for it, nor begun anew.
+/// Its library was built once more: a run that is done is not called failed for it, nor begun again.
 #[test]
 fn a_run_that_is_done_outlives_its_library() {
     let place = place(STUDY);
@@ -592,8 +592,8 @@ fn a_run_that_is_done_outlives_its_library() {
     assert_eq!(kept, history);
 }
 
-/// One library beside another: a run that was planned, and not carried out before the library was built once more, is
-/// not put beside those of the earlier one.
+/// One library next to another: a run that was planned, and not carried out before the library was built once more, is
+/// not put next to those of the earlier one.
 #[test]
 fn a_planned_run_is_refused_beside_runs_of_an_earlier_library() {
     let place = place(STUDY);

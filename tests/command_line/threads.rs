@@ -52,7 +52,7 @@ fn a_small_run_that_takes_long_has_all_threads() {
     }
 }
 
-/// Of the process that a watcher watches, in its first second.
+/// Threads of the watched process in its first second.
 fn most_threads_of_child(watcher: u32) -> usize {
     let begun = Instant::now();
     let mut most = 0;

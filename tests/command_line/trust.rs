@@ -1,4 +1,4 @@
-//! Which libraries are opened, and what is found out about them before.
+//! Libraries that are opened, and the findings about them before.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use crate::program::{BAD_INPUT, CASE, DONE, PLUGIN_TROUBLE, Place};
@@ -17,7 +17,7 @@ fn sha256(library: &Path) -> String {
     law::hexadecimal_sha256(&std::fs::read(library).unwrap())
 }
 
-/// The case with a SHA-256 beside its soil's law.
+/// The case with a SHA-256 next to its soil's law.
 fn pinned(sha256: &str) -> String {
     let key = format!("law = \"elastic\"\nsha256 = \"{sha256}\"");
     CASE.replacen("law = \"elastic\"", &key, 1)

@@ -19,7 +19,7 @@ fn ends_of_children_are_told_whoever_started_the_program() {
     }
 }
 
-/// A copy of a process has one thread, so one with several carries out all itself, and says so.
+/// A copy of a process has one thread, so one with several carries out all itself, and reports it.
 #[test]
 fn a_program_that_has_threads_already_is_not_watched() {
     const THREAD: &str = "#include <pthread.h>\n#include <unistd.h>\n\

@@ -115,7 +115,7 @@ fn a_wrong_call_can_be_repeated() {
     }
 }
 
-/// What a check warns of, replaying its call warns of too, and neither is an error.
+/// Replaying the call of a warning warns too, and neither is an error.
 #[test]
 fn a_doubtful_call_can_be_repeated() {
     for (fixture, id) in [
@@ -403,7 +403,7 @@ fn a_routine_that_crashes_on_opening_or_at_the_end_can_be_repeated() {
     }
 }
 
-/// What is wrong with such a capsule is marked in it.
+/// The defect of such a capsule is marked in it.
 #[test]
 fn a_capsule_of_a_library_is_read_with_care() {
     let folder = folder();

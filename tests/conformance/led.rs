@@ -20,7 +20,7 @@ fn routine(kind: &str, name: &str, folder: &Path) -> Option<PathBuf> {
     compiled_from(&source, &fixtures, folder)
 }
 
-/// A driver in this folder, of the library beside it.
+/// A driver in this folder, of the library next to it.
 fn driver(folder: &Path, head: &str, rest: &str) -> String {
     let file = folder.join("driver.toml");
     let text = format!("{head}hypothesis = \"plane_strain\"\n{rest}");

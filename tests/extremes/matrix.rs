@@ -1,4 +1,4 @@
-//! The matrix: every combination ends as *agrees*, *refused* or *silent*, and the counts stand in
+//! The matrix: every combination ends as *agrees*, *refused* or *silent*, and the counts are in
 //! `tests/README.md`.
 //!
 //! Silent is a result that the law calls good and that is wrong beyond the tolerance of its family, or

@@ -1,6 +1,6 @@
 //! A million law calls in cycles: memory does not grow, the stress stays on the surface.
 //!
-//! Memory is that of a process of its own, where no other test runs.
+//! Memory is that of a separate process, where no other test runs.
 
 use crate::mepi_paths::{FONTAINEBLEAU, TABLE_4};
 use crate::mohr_coulomb::{self, Parameters, Pyramid};

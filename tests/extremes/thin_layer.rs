@@ -94,5 +94,5 @@ top = {{ line = "top", quantity = "displacement_y" }}
     compare().map_or_else(Verdict::Silent, |()| Verdict::Agrees)
 }
 
-/// Of the stress and the strain.
+/// Errors of the stress and the strain.
 const TOLERANCE: f64 = 1e-7;

@@ -5,7 +5,7 @@ use qd::Quad;
 /// A number of twice the digits.
 pub(crate) type Wide = Quad<f64>;
 
-/// A double as it is.
+/// A double unchanged.
 pub(crate) fn wide(value: f64) -> Wide {
     Quad(value, 0.0)
 }

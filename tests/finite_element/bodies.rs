@@ -217,7 +217,7 @@ equations = "{equations}"
     }
 }
 
-/// What pressed once, and is gone, does not loosen what comes after it.
+/// A past pressure does not loosen later tolerances.
 #[test]
 fn earlier_loads_do_not_widen_the_tolerance() {
     let settlement = |before: &str| {

@@ -31,7 +31,7 @@ const U: f64 = 2.5e-4;
 /// What the blocks (1e11 kPa) yield.
 const RIGID: f64 = 1e-4;
 
-/// A block pushed in so many increments, with this cohesion; `more` goes before the laws.
+/// A block pushed in this many increments, with this cohesion; `more` goes before the laws.
 fn pushed(increments: usize, joint: &str, top: &str, more: &str) -> String {
     format!(
         r#"

@@ -81,7 +81,7 @@ fn condensing_the_ground_changes_no_answer() {
 
 type Rows = [std::collections::BTreeMap<String, String>];
 
-/// All probes of so many increments are the same but for 1e-9 of their largest value.
+/// All probes of this many increments are the same but for 1e-9 of their largest value.
 fn agree(case: &str, condensed: &Rows, sparse: &Rows, increments: usize) {
     let probes = condensed[0].keys();
     for probe in probes.filter(|name| !["phase", "iterations"].contains(&name.as_str())) {
@@ -100,7 +100,7 @@ fn agree(case: &str, condensed: &Rows, sparse: &Rows, increments: usize) {
     }
 }
 
-/// The chamber with 520 unknowns on the boundary, beside which a factorisation takes longer than many iterations.
+/// The chamber with 520 unknowns on the boundary, next to which a factorisation takes longer than many iterations.
 const FINE: &str = r#"
 [mesh]
 columns = [
@@ -136,7 +136,7 @@ fn where_factorising_is_dear_a_matrix_serves_several_increments() {
 }
 
 /// A head that is pushed, let go of with a force on it, held across as well, led up and down, and let go of
-/// again. What is free by turns is kept beside the boundary in all phases.
+/// again. Unknowns that are free in some phases are kept with the boundary in all phases.
 const BY_TURNS: &str = r#"
 [[phase]]
 name = "let_go"
@@ -352,7 +352,7 @@ fn what_is_looked_at_does_not_depend_on_what_is_written() {
     }
 }
 
-/// Linear ground beside ground that yields, which meet in nodes that do not move; a peg is free, then pushed.
+/// Linear ground next to ground that yields, which meet in nodes that do not move; a peg is free, then pushed.
 const APART: &str = r#"
 analysis = "plane_strain"
 [mesh]

@@ -5,7 +5,7 @@
 //! Geometry    the strip footing; the thick cylinder
 //! Boundary    as there; the cylinder under pressure from inside
 //! Law         mohr_coulomb
-//! Asserts     equal limits with and without cut-backs; what is said of the steps, by runs with other steps; error,
+//! Asserts     equal limits with and without cut-backs; what is reported of the steps, by runs with other steps; error,
 //!             exit code, history, summary
 
 use crate::footing::{FRICTION, Footing, push, text};

@@ -286,7 +286,7 @@ mesh_error = true
     assert!(summary["mesh_error"].is_null());
 }
 
-/// A joint, and what is not there, have no estimate: their share is no number that an error could be. A run whose
+/// A joint, and what is absent, have no estimate: their share is no number that an error could be. A run whose
 /// first phase fails says that none was found.
 #[test]
 fn no_estimate_is_not_taken_for_no_error() {

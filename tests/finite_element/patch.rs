@@ -42,7 +42,7 @@ impl Normal {
 pub(crate) struct Expected {
     group: String,
     values: Vec<(&'static str, f64)>,
-    /// What stresses and tractions are compared with, and jumps.
+    /// References of stresses, tractions and jumps.
     scales: [f64; 2],
     tolerance: f64,
 }

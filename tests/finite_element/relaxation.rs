@@ -163,7 +163,7 @@ const OWN: View = View {
     exchanged: false,
 };
 
-/// A stiff punch beside cohesionless ground that came to a standstill, in plane strain; what it holds on to does
+/// A stiff punch next to cohesionless ground that came to a standstill, in plane strain; what it holds on to does
 /// not matter to the laws.
 fn punch(view: View, control: &str) -> String {
     let View {

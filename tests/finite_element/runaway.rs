@@ -1,7 +1,7 @@
 //! Mechanisms that carry an iterate away.
 //!
 //! Goal        what runs away is no equilibrium: the run is right, or ends with exit code 2
-//! Geometry    a steel pile beside ground on a fine mesh; a footing on a strongly graded one
+//! Geometry    a steel pile next to ground on a fine mesh; a footing on a strongly graded one
 //! Boundary    ground without confinement, integration `reduced`: elements next to no stiffness
 //!             holds; head or strip pushed down
 //! Law         mohr_coulomb
@@ -308,7 +308,7 @@ displacement = [{ line = "head", y = -0.01 }]
 method = "modified_newton"
 "#;
 
-/// Corrections that grow until their squares are no numbers end the iterations there: what is said of them is finite, and
+/// Corrections that grow until their squares are no numbers end the iterations there: what is reported of them is finite, and
 /// how many there were.
 #[test]
 fn iterations_that_leave_all_numbers_behind_end_there() {

@@ -4,8 +4,8 @@
 //! Geometry  a column of 3 × 4 unequal quads under an end pressure, standing and lying; a round pile
 //!           in a ring of soil with an interface along its whole shaft
 //! Asserts   the force through every section is the end load; through part of one its share; the
-//!           integral of the friction is what equilibrium leaves to the shaft; reactions beside an
-//!           interface that is not there are those of the mesh without it
+//!           integral of the friction is what equilibrium leaves to the shaft; reactions next to an
+//!           interface that is absent are those of the mesh without it
 
 use crate::setup::{Results, assert_close, run};
 use std::f64::consts::PI;
@@ -275,7 +275,7 @@ traction = { group = "joint", quantity = "traction_n", reduce = "integral" }
     assert_close("traction", finished.last("traction"), -50.0, EXACT, 50.0);
 }
 
-/// Two blocks with a wall between them that is not there: what holds or pushes a line that ends at the wall is that of one
+/// Two blocks with a wall between them that is absent: what holds or pushes a line that ends at the wall is that of one
 /// block, on either side and with the blocks to the right or to the left, condensed or not.
 #[test]
 fn reactions_beside_an_interface_that_is_not_there_are_those_without_it() {

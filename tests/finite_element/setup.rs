@@ -42,7 +42,7 @@ pub(crate) fn fail(text: &str) -> Failed {
 
 /// A folder of results.
 pub(crate) trait Results {
-    /// Where they are.
+    /// Their place.
     fn folder(&self) -> &Path;
 
     /// Values of a probe in `history.csv`, all phases.

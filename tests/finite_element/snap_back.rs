@@ -2,7 +2,7 @@
 //!
 //! Goal        arc-length control: a snap-back under prescribed displacement, a limit load under a
 //!             prescribed force
-//! Geometry    a rigid block on a thin layer (`mean`) on a rigid base, a rope of ν = 0 beside it on
+//! Geometry    a rigid block on a thin layer (`mean`) on a rigid base, a rope of ν = 0 next to it on
 //!             a layer that is next to nothing
 //!
 //! ```text
@@ -38,7 +38,7 @@ const A_0: f64 = 4.0;
 const PEAK: f64 = 1e-3;
 const MU_P: f64 = 0.8;
 const MU_R: f64 = 0.4;
-/// Of forces, see above.
+/// Tolerance of forces, see above.
 const UNEVEN: f64 = 2e-3;
 
 fn text(solver: &str, pull: &str) -> String {
@@ -156,7 +156,7 @@ fn turning_points() -> [f64; 2] {
     [pull(turn), least]
 }
 
-/// Of every step in the phase: slip, force, displacement of the rope's end.
+/// For every step in the phase: slip, force, displacement of the rope's end.
 fn path(folder: &Path) -> Vec<[f64; 3]> {
     let columns = ["slip", "tau", "pull"].map(|name| column(&folder.join("path.csv"), name));
     (1..columns[0].len())
@@ -276,7 +276,7 @@ fn the_arc_length_takes_over_at_the_last_halving() {
     }
 }
 
-/// Ground whose weightless stress does not go with its water, beside a joint that softens: the path goes back and on
+/// Ground whose weightless stress does not go with its water, next to a joint that softens: the path goes back and on
 /// back. It went to −34.6 of the phase in 500 steps.
 #[test]
 fn a_path_that_runs_backwards_is_recognised() {

@@ -1,6 +1,6 @@
 //! What a law makes of the stress it finds at the start of a phase.
 //!
-//! Goal        the stress that a swap changes is said, and the force that this leaves out of balance is
+//! Goal        the stress that a swap changes is reported, and the force that this leaves out of balance is
 //!             taken off in proportion to the phase's course; the way there does not matter where the
 //!             path does not, and by how much where it does; a resumed run has the same bits
 //! Geometry    a square between smooth walls, 1 × 1; a strip on ground; the sliding block
@@ -157,7 +157,7 @@ fn a_swap_ends_where_two_swaps_end() {
     assert_close("s_22", one.last("s_22"), -P, EQUILIBRIUM, P);
 }
 
-/// Settlement of a strip whose ground becomes clay of 20 kPa in swaps of so many increments, in one or in two.
+/// Settlement of a strip whose ground becomes clay of 20 kPa in swaps of this many increments, in one or in two.
 fn strip(increments: usize, in_two: bool) -> f64 {
     let law = |name: &str, cohesion: f64| {
         tresca(name, cohesion).replace("poisson_ratio = 0.25", "poisson_ratio = 0.3")
@@ -300,7 +300,7 @@ fn an_interface_says_what_becomes_of_its_traction() {
     }
 }
 
-/// Stops after so many increments.
+/// Stops after this many increments.
 struct Stopping {
     left: usize,
     flag: Arc<AtomicBool>,

@@ -88,8 +88,8 @@ fn both_ways_up_no_force_is_left() {
     assert!((pushed[0] / pushed[1] - 1.0).abs() < 1e-8, "{pushed:?}");
 }
 
-/// A pile in sand that yields, under the stress that both have: in equilibrium before anything moves. What moves is
-/// round-off.
+/// A pile in sand that yields, under the stress that both have: in equilibrium before anything
+/// moves. All motion is round-off.
 const NOTHING: &str = r#"
 analysis = "axisymmetric"
 [mesh]

@@ -98,7 +98,7 @@ fn cmake_finds_the_package() {
     }
 }
 
-/// A version that is not there is refused by its number.
+/// A version that is absent is refused by its number.
 #[test]
 fn cmake_refuses_another_version() {
     if output(Command::new("cmake").arg("--version")).is_none() {

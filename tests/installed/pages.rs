@@ -12,7 +12,7 @@ const LONG_ENOUGH: f64 = 1.0;
 /// Files and names that the reader brings.
 const OF_THE_READER: [&str; 3] = ["mysand.f", "driver.toml", "<id>"];
 
-/// Programs of others that commands start. Their examples have tests of their own, where there is a repository.
+/// Programs of others that commands start. Their examples have their own tests, where there is a repository.
 const OF_OTHERS: [&str; 6] = [
     "sbatch",
     "snakemake",

@@ -32,7 +32,7 @@ fn python() -> Option<PathBuf> {
     None
 }
 
-/// `run.py` on so many ranks.
+/// `run.py` on this many ranks.
 fn on_ranks(python: &Path, ranks: u32, arguments: &[&str], results: &Path) -> Output {
     let mut command = Command::new(python.with_file_name("mpiexec"));
     command.arg("-n").arg(ranks.to_string()).arg(python);
@@ -168,7 +168,7 @@ fn a_run_goes_on_on_other_ranks() {
     );
 }
 
-/// It ends with this exit code and one message that says so.
+/// It ends with this exit code and one message that reports it.
 #[track_caller]
 fn refused(output: &Output, code: i32, message: &str) {
     let said = String::from_utf8_lossy(&output.stderr);

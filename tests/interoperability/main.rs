@@ -1,7 +1,7 @@
 //! Laws in other programs, and laws of other programs here. Routes and traps: abi/interoperability.md.
 //!
 //! What needs OpenGeoSys, Kratos or SALib is passed over with a remark where they are not installed, or
-//! fails (`tests::needs`): `install.sh` beside this file installs them. What needs DOLFINx is passed over
+//! fails (`tests::needs`): `install.sh` next to this file installs them. What needs DOLFINx is passed over
 //! with a remark in any case: `cases/distributed/install.sh` installs it.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
@@ -24,7 +24,7 @@ fn library(law: &str) -> PathBuf {
     program.with_file_name(format!("lib{law}.so"))
 }
 
-/// A file beside this one.
+/// A file next to this one.
 fn beside(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("interoperability")

@@ -1,4 +1,4 @@
-//! What MEPI has to give in the shear box, by quadrature of its rate equations.
+//! Answers of MEPI in the shear box, by quadrature of its rate equations.
 //!
 //! Compression and contraction positive. In monotonic shear ξ is the plastic slip, and with a spring
 //! of stiffness K behind the interface everything follows from ξ alone:

@@ -1,4 +1,4 @@
-//! Cases: a block in or on soil, with or without an interface beside or below it, pressed, pushed and
+//! Cases: a block in or on soil, with or without an interface next to or below it, pressed, pushed and
 //! pushed back. Reactions balance the loads, what is prescribed is met, nothing runs away in silence.
 
 use crate::seeds::{End, hold};
@@ -8,11 +8,11 @@ use std::fmt::Write as _;
 use std::path::Path;
 use tests::case::{Silent, run_text, table};
 
-/// Where the interface is.
+/// Place of the interface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Seam {
     None,
-    /// A thin layer beside the block, or below it.
+    /// A thin layer next to the block, or below it.
     LayerBeside,
     LayerBelow,
     /// Without thickness.
@@ -24,7 +24,7 @@ enum Seam {
 enum Load {
     /// On the surface, parts of the unit of stress.
     Pressure(f64),
-    /// Of the block's head, parts of the model's size.
+    /// Size of the block's head, as parts of the model's size.
     Push(f64),
     /// Back to where it was.
     Back,
@@ -36,9 +36,9 @@ struct Model {
     origin: f64,
     /// Width of the model, m.
     size: f64,
-    /// Of the thin column and row, parts of the size.
+    /// Size of the thin column and row, as parts of the size.
     thin: f64,
-    /// Elements: columns of the block, of the soil, rows below and beside the block.
+    /// Elements: columns of the block, of the soil, rows below and next to the block.
     n: [usize; 4],
     soil: (&'static str, f64, f64, f64, Option<f64>),
     soil_integration: &'static str,

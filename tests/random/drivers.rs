@@ -1,4 +1,4 @@
-//! Drivers: controls are met in every row, or the row is not there.
+//! Drivers: controls are met in every row, or the row is absent.
 
 use crate::seeds::{End, hold};
 use input::Driver;
@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use std::fmt::Write as _;
 use text::Source;
 
-/// What a number is measured in: the power of the unit of stress.
+/// Unit of a number: the power of the unit of stress.
 type Power = f64;
 
 #[derive(Clone, Debug)]
@@ -87,7 +87,7 @@ impl Path {
         times * 100.0 / self.law.modulus
     }
 
-    /// Where a component stands in a view, and its sign there.
+    /// Position of a component in a view, and its sign there.
     fn seen(&self, i: usize, view: View) -> (usize, f64) {
         let flips = match self.components()[i] {
             "t" | "12" => view.mirrored,

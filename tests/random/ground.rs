@@ -1,5 +1,5 @@
 //! Ground posed in memory: layers at rest under water or above it, loaded, dug away and filled again, with
-//! an interface or without. At rest nothing moves; whatever happens then, reactions carry what stands on
+//! an interface or without. At rest nothing moves; whatever happens then, reactions carry what is on
 //! them; in another unit of stress, and in the mirror, the same happens.
 
 use crate::seeds::{End, hold};
@@ -26,7 +26,7 @@ const SKIN: usize = 3;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Change {
-    /// kPa on the surface beside the block.
+    /// kPa on the surface next to the block.
     Pressure(f64),
     /// kN on the block's head, which is rigid from then on.
     Force(f64),
@@ -51,7 +51,7 @@ struct Ground {
     is_axisymmetric: bool,
     are_triangles: bool,
     is_skewed: bool,
-    /// Columns of the block and beside it, rows of each layer.
+    /// Columns of the block and next to it, rows of each layer.
     n: [usize; 3],
     integration: Option<Integration>,
     is_plastic: bool,
@@ -357,7 +357,7 @@ impl Ground {
         problem
     }
 
-    /// What stands on the bottom at the end of a phase, kN; the first is that of rest. Of the pushed head
+    /// Load on the bottom at the end of a phase, kN; the first is that of rest. Of the pushed head
     /// see the reactions.
     fn on_bottom(&self, phase: usize) -> f64 {
         let (mut pressure, mut force, mut level) = (0.0, 0.0, self.water);
@@ -439,7 +439,7 @@ impl Ground {
         Ok(End::Done)
     }
 
-    /// Settlements of the head after each phase; or why there are none.
+    /// Settlements of the head after each phase; or why none exist.
     fn run(&self, posed: Posed) -> Result<Result<Vec<f64>, String>, String> {
         let fails = |error: Error| match &error {
             // Weight tilts a head before it is rigid: that is no reason not to push it.
@@ -504,7 +504,7 @@ impl Ground {
     }
 }
 
-/// Whether a head that is pushed in so many increments is rigid.
+/// Whether a head that is pushed in this many increments is rigid.
 fn is_rigid(increments: usize) -> bool {
     increments > 1
 }

@@ -19,7 +19,7 @@ const NAMES: [&str; 4] = [
 /// It takes a few seconds.
 const PATIENCE: Duration = Duration::from_mins(2);
 
-/// The browser; `None`, with a remark, where there is none.
+/// The browser; `None`, with a remark, where absent.
 fn chromium() -> Option<PathBuf> {
     let path = std::env::var_os("PATH").unwrap_or_default();
     let found = std::env::split_paths(&path)

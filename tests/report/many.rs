@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use tempfile::TempDir;
 
 const RUNS: usize = 100;
-/// Of a comparison of many runs.
+/// Limits of a comparison of many runs.
 const MOST_BYTES: usize = 5_000_000;
 
 /// Copies of a run with another friction and, by turns, another method and another last force.

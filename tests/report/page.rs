@@ -1,4 +1,4 @@
-//! What stands in the page.
+//! Content of the page.
 
 use crate::folders::{CASE, edited, folders, page_of};
 use results::report::{default_path, write};

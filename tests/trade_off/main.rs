@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use tests::case::table;
 
-/// Cases that are studied beside the drivers in the folder.
+/// Cases that are studied next to the drivers in the folder.
 const CASES: &[&str] = &["chamber_mesh1"];
 /// Cases whose interface stiffness is studied.
 const JOINTS: &[&str] = &["chamber_joint"];
@@ -128,7 +128,7 @@ fn errors(text: &str) -> BTreeMap<(String, String), f64> {
     errors
 }
 
-/// What stands before, between and after the marks of the README.
+/// Text before, between and after the marks of the README.
 fn readme() -> [String; 3] {
     let text = std::fs::read_to_string(cases().join("trade_off/README.md")).unwrap();
     let (before, rest) = text.split_once(MARKS[0]).unwrap();

@@ -2,7 +2,7 @@
 //! named `@LIBRARY_CALCULIX`. (A material named `@ABAQUS_LIBRARY_UMAT` is called as in
 //! [`umat`](crate::umat).)
 //!
-//! Always three dimensions. Strains are tensor components, internal variables stand in an array of
+//! Always three dimensions. Strains are tensor components, internal variables are in an array of
 //! the whole model, and the tangent is symmetric: of an unsymmetric one CalculiX gets the
 //! symmetric part, as its own interface to Abaqus' routines makes it. That slows the iteration of
 //! laws with non-associated flow and does not change the stress.

@@ -76,7 +76,7 @@ impl<L: Exported> Built<L> {
         }
     }
 
-    /// The same in a place of its own, as it may be large.
+    /// The same in its own place, as it may be large.
     #[cold]
     #[inline(never)]
     fn boxed(given: &[f64]) -> Box<Self> {

@@ -1,4 +1,4 @@
-//! Laws in the terms of other programs. What a law's library exports beside the contract: the entries
+//! Laws in the terms of other programs. What a law's library exports next to the contract: the entries
 //! of Abaqus and CalculiX user materials and MFront's generic behaviours, from the same two traits.
 //! `abi/interoperability.md` says what each program makes of them.
 #![expect(
@@ -19,7 +19,7 @@ pub mod umat;
 #[doc(hidden)]
 pub use abi;
 
-/// Exports a law to other programs, beside [`abi::export_laws!`]:
+/// Exports a law to other programs, next to [`abi::export_laws!`]:
 /// `bridges::export!(continuum Soil);` exports the MFront behaviour `Soil`, and the entries of
 /// Abaqus and CalculiX user materials; `bridges::export!(interface Joint);` the behaviour
 /// `Joint`. A law that does not offer all of the hypotheses names those it offers, in MFront's

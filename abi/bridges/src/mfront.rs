@@ -196,7 +196,7 @@ macro_rules! export_mfront {
     }; )+ };
 }
 
-/// What MFront's interface is told of a behaviour by numbers.
+/// Numbers that describe a behaviour to MFront's interface.
 #[derive(Clone, Copy, Debug)]
 pub enum Kind {
     /// Strain and stress.
@@ -387,7 +387,7 @@ pub const fn setting_names<L: Exported, const N: usize>() -> [Name; N] {
 /// The description of the parameter that has this name in MFront's spelling.
 ///
 /// # Panics
-/// If there is none; at compile time, where a law is exported.
+/// If none exists; at compile time, where a law is exported.
 pub const fn declared<L: Exported>(name: &str) -> &'static raw::Parameter {
     let table = <L::Parameters as Parameters>::TABLE;
     let mut i = 0;

@@ -233,7 +233,7 @@ pub unsafe fn answer<L: ContinuumLaw>(laws: &Laws<Continuum<L>>, call: &Call) {
     }
 }
 
-/// Why the law cannot be called with so many components.
+/// Why the law cannot be called with this many components.
 fn unusable<L: Exported>(ntens: c_int, ndi: c_int) -> Option<&'static str> {
     match (ntens, ndi) {
         (6, 3) if offers::<L>(Hypothesis::ThreeD) => None,
@@ -246,7 +246,7 @@ fn unusable<L: Exported>(ntens: c_int, ndi: c_int) -> Option<&'static str> {
 /// Carries a point with `N` components and writes its end.
 ///
 /// # Errors
-/// The step factor; the reason is said.
+/// The step factor; the reason is reported.
 ///
 /// # Safety
 /// As [`answer`].

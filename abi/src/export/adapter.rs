@@ -18,7 +18,7 @@ mod sealed {
 
 /// What the boundary needs of a law, whichever trait its author chose.
 pub trait Exported: sealed::Sealed + Sized + Send + Sync + 'static {
-    /// What the law is called.
+    /// Name of the law.
     const DESCRIPTION: Description;
     /// Parameters.
     type Parameters: Parameters;
@@ -53,7 +53,7 @@ pub trait Exported: sealed::Sealed + Sized + Send + Sync + 'static {
     /// Rates of point `i` at the end of the increment.
     ///
     /// # Errors
-    /// Why there are none.
+    /// Why none exist.
     fn rates<const PACKED: bool>(
         &self,
         access: &Access<'_, PACKED>,
@@ -66,7 +66,7 @@ pub trait Exported: sealed::Sealed + Sized + Send + Sync + 'static {
     /// Rates of the initial internal variables of point `i`.
     ///
     /// # Errors
-    /// Why there are none.
+    /// Why none exist.
     fn initial_rates<const PACKED: bool>(
         &self,
         access: &Access<'_, PACKED>,

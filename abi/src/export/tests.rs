@@ -39,13 +39,13 @@ unsafe impl GlobalAlloc for Counting {
 static ALLOCATOR: Counting = Counting;
 
 crate::parameters! {
-    /// What the probe does.
+    /// Action of the probe.
     pub struct Setting {
         /// How the probe behaves.
         deed: Parameter::new(c"-", c"-").one_of(crate::choices!(
             c"carry", c"cut", c"panic", c"panic_in_drop", c"read_astray", c"write_astray",
         )),
-        /// What it does it with.
+        /// Target of the action.
         value: Parameter::new(c"x", c"-").default(0.0).optional(),
     }
 }
@@ -76,7 +76,7 @@ impl InternalVariables for Astray {
     }
 }
 
-/// An interface without stiffness that misbehaves as it is told.
+/// An interface without stiffness that misbehaves on request.
 struct Probe(Setting);
 
 impl InterfaceLaw for Probe {

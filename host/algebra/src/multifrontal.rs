@@ -12,7 +12,7 @@
 //! A matrix that differs from the last one in some entries only costs the supernodes that eliminate
 //! them and those above; what the others leave is taken over, bit for bit. So a body pays for what
 //! yields, not for what stays elastic. What large supernodes leave is kept for it where [other matrices
-//! follow](Multifrontal::expect_others); what a small one leaves beside those that have changed is
+//! follow](Multifrontal::expect_others); what a small one leaves next to those that have changed is
 //! computed once more, with all below it, and kept until it changes itself.
 //!
 //! Symmetric matrices are factorised as L Lᵀ and have to be positive definite; others as L U with

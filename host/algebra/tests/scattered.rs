@@ -82,7 +82,7 @@ fn solutions_are_right() {
     }
 }
 
-/// Every eliminated unknown stands in one front, whatever is kept; condensed and solved, the
+/// Every eliminated unknown is in one front, whatever is kept; condensed and solved, the
 /// equations have the solution of the whole.
 #[test]
 fn condenses_scattered_unknowns() {

@@ -27,7 +27,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// What cargo has built, in release.
+/// Release build of cargo.
 #[derive(Clone, Debug)]
 pub struct Built {
     /// The program.
@@ -78,12 +78,12 @@ const FILES: [(&str, &str); 17] = [
     ("models/README.md", "share/doc/pilum/models"),
 ];
 
-/// What is laid out.
+/// The layout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// What a system has beside its other programs.
+    /// Layout of a system installation.
     Archive,
-    /// What a Python package has in it, beside its extension module.
+    /// Content of a Python package besides its extension module.
     Wheel,
 }
 
@@ -97,7 +97,7 @@ impl Kind {
 /// Where `man` looks for the pages of the program and of its commands.
 const MANUAL: &str = "share/man/man1";
 
-/// What the program prints, and the file that it goes to.
+/// Output of the program, and its file.
 const PRINTED: [(&[&str], &str); 3] = [
     (
         &["completions", "bash"],

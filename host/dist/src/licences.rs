@@ -18,9 +18,9 @@ const NAMES: [&str; 6] = [
     "UNLICENSE",
 ];
 
-/// Writes `licences.txt` into a folder: every package of the program, of the laws and of a library beside them with
-/// its licence, then the texts, each once. Beside it comes what Rust says of its own library, where the toolchain
-/// has it.
+/// Writes `licences.txt` into a folder: every package of the program, of the laws and of a library next to them with
+/// its licence, then the texts, each once. The licences of Rust's own library follow, if the
+/// toolchain has them.
 pub(crate) fn write(
     repository: &Path,
     metadata: &Metadata,

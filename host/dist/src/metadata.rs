@@ -31,7 +31,7 @@ pub(crate) struct Package {
     pub(crate) folder: PathBuf,
     /// Whether it comes from a registry.
     pub(crate) is_foreign: bool,
-    /// What runs in the compiler is in no library.
+    /// Code that runs in the compiler is in no library.
     is_of_compiler: bool,
     /// The library of a law.
     law: Option<String>,

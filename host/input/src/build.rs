@@ -266,7 +266,7 @@ impl Case {
         }
     }
 
-    /// What is plausible in the case but seldom meant, beside what its problem is warned of.
+    /// Warnings about implausible input of the case, besides those of its problem.
     pub fn warnings(&self, simulation: &Simulation) -> Vec<String> {
         let mut warnings = probes::reactions(self, simulation.problem());
         warnings.extend(self.forgetful_swaps(simulation.problem()));
@@ -372,7 +372,7 @@ impl Case {
         }
     }
 
-    /// Where a part of the problem is written.
+    /// Place of a part of the problem in the file.
     fn span(&self, item: &Item, cause: &Cause) -> Range<usize> {
         let file = &self.file;
         let group = |number: usize| file.groups.get_index(number);

@@ -42,7 +42,7 @@ pub struct Calibration {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CalibrationFile {
-    /// What the calibration is.
+    /// Title of the calibration.
     #[serde(default)]
     pub title: String,
     /// The parameters that are looked for, by name.
@@ -61,7 +61,7 @@ pub struct CalibrationFile {
     /// out, 2 if a test is a case.
     #[schemars(with = "Option<usize>", range(min = 1))]
     pub starts: Option<Spanned<usize>>,
-    /// Which places those are; the same number gives the same places.
+    /// Seed of these places; the same number gives the same places.
     #[serde(default)]
     pub seed: u64,
     /// Whether the `noise` of curves is known, or only its proportions.
@@ -71,7 +71,7 @@ pub struct CalibrationFile {
     #[serde(default = "confidence")]
     #[schemars(with = "f64", extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub confidence: Spanned<f64>,
-    /// Follow the profile of each parameter: the best sum of squares for values beside the best one.
+    /// Follow the profile of each parameter: the best sum of squares for values next to the best one.
     #[serde(default = "yes")]
     pub profiles: bool,
     /// Step of differences, relative to a parameter's range or, on a logarithmic scale, to itself; 1e-4
@@ -88,7 +88,7 @@ fn yes() -> bool {
     true
 }
 
-/// What is known of the scatter of measured values.
+/// Scatter of measured values.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Variance {
@@ -121,7 +121,7 @@ pub struct FreeInput {
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub laws: Vec<Spanned<String>>,
-    /// Where the search starts; the value in the file of the first test that has it, if left out.
+    /// Start of the search; by default the value in the first test that has it.
     #[schemars(with = "Option<f64>")]
     pub start: Option<Spanned<f64>>,
     /// Least value; the law's own bound if left out.
@@ -188,7 +188,7 @@ fn weight() -> Spanned<f64> {
     Spanned::new(0..0, 1.0)
 }
 
-/// A measured curve, and the computed one beside it.
+/// A measured curve, and the computed one next to it.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CurveInput {
@@ -306,7 +306,7 @@ impl Calibration {
         stem.to_string_lossy().into_owned()
     }
 
-    /// Where a file is that a key names.
+    /// Place of a file that a key names.
     pub fn path_of(&self, written: &Spanned<PathBuf>) -> PathBuf {
         let file = self.source.path_at(&written.span());
         file.parent()
@@ -327,7 +327,7 @@ impl Calibration {
         self.source.error(at, message).into()
     }
 
-    /// What can be said of the file without any other.
+    /// What can be reported of the file without any other.
     fn check(&self) -> Result<(), Error> {
         let file = &self.file;
         let above = |value: &Spanned<f64>, key: &str, most: f64| {

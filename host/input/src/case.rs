@@ -37,7 +37,7 @@ pub struct Case {
     pub file: CaseFile,
     /// Name of the variant, if the file stands for several cases.
     pub variant: Option<String>,
-    /// What its laws' libraries are opened with.
+    /// Settings for opening the libraries of its laws.
     pub opener: Opener,
 }
 
@@ -147,7 +147,7 @@ impl Case {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CaseFile {
-    /// What the case is.
+    /// Title of the case.
     #[serde(default)]
     pub title: String,
     /// Kinematics of the plane.
@@ -187,7 +187,7 @@ pub struct CaseFile {
     #[serde(default = "default_solver")]
     #[schemars(with = "Settings")]
     pub solver: Spanned<Settings>,
-    /// What is written.
+    /// Output.
     #[serde(default)]
     pub output: Output,
     /// Relative error of the probes that the run may have; settings that reach it are then found
@@ -264,7 +264,7 @@ pub struct MeshInput {
     /// How often each element of the file is divided into four.
     #[serde(skip)]
     pub divisions: u32,
-    /// What the file holds, where it is not read: a mesh that was made in memory.
+    /// Content of the file if it is not read: a mesh made in memory.
     #[serde(skip)]
     pub content: Option<Arc<[u8]>>,
 }
@@ -340,7 +340,7 @@ pub struct LawInput {
     /// SHA-256 that its library must have, in hexadecimal digits.
     #[schemars(with = "Option<String>")]
     pub sha256: Option<Spanned<String>>,
-    /// What its library is made for, if not for the contract; or that it is made from another law.
+    /// Program that its library is made for, if not for the contract; or another law as its source.
     #[schemars(with = "Option<Route>")]
     pub adapter: Option<Spanned<Route>>,
     /// That library.
@@ -361,7 +361,7 @@ pub struct LawInput {
     /// What becomes of its scratch files.
     #[schemars(with = "Option<Scratch>")]
     pub scratch: Option<Spanned<Scratch>>,
-    /// UDSM: how its stiffness stands in memory; `columns`, as Fortran has it, if left out.
+    /// UDSM: how its stiffness is in memory; `columns`, as Fortran has it, if left out.
     #[schemars(with = "Option<Order>")]
     pub tangent_order: Option<Spanned<Order>>,
     /// Shear zone: its thickness, m. `law` is then a law of solids, or another table of laws.
@@ -426,7 +426,7 @@ pub struct GroupInput {
     /// The law, by its name under `laws`; phases may swap it.
     #[schemars(with = "String")]
     pub law: Spanned<String>,
-    /// Where the law is evaluated; the default depends on the formulation.
+    /// Integration points of the law; the default depends on the formulation.
     #[schemars(with = "Option<Integration>")]
     pub integration: Option<Spanned<Integration>>,
     /// Zero thickness: the line along which the elements are inserted.
@@ -523,12 +523,12 @@ pub struct PhaseInput {
     #[schemars(with = "BTreeMap<String, String>")]
     pub laws: Named<String>,
     /// Groups that are there from this phase on: solids free of stress, interfaces with the stress
-    /// beside them.
+    /// next to them.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub activate: Vec<Spanned<String>>,
     /// Groups that are gone from this phase on; what they carried is released in its course. An interface
-    /// goes with the ground beside it, and is named as well. One group at least stays.
+    /// goes with the ground next to it, and is named as well. One group at least stays.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub deactivate: Vec<Spanned<String>>,
@@ -666,7 +666,7 @@ pub struct PileInput {
     pub group: GroupNames,
     /// Interface groups along its shaft, from the head to the toe.
     pub shaft: GroupNames,
-    /// What is under its base: an interface group, or a line along which it stands on the ground.
+    /// What is under its base: an interface group, or a line along which it is on the ground.
     #[schemars(with = "String")]
     pub base: Spanned<String>,
     /// The line of its head.
@@ -788,7 +788,7 @@ impl FigureInput {
 #[schemars(transform = schema::radius_and_axis)]
 #[serde(deny_unknown_fields)]
 pub struct CutInput {
-    /// Of this group; of all if left out.
+    /// Group; by default all.
     #[schemars(with = "Option<String>")]
     pub group: Option<Spanned<String>>,
     /// Extent in x (r).
@@ -882,7 +882,7 @@ impl JsonSchema for MeasuredTables {
     }
 }
 
-/// Of a file without `[solver]`.
+/// For a file without `[solver]`.
 fn default_solver() -> Spanned<Settings> {
     Spanned::new(0..0, Settings::default())
 }

@@ -9,9 +9,9 @@ pub struct Chosen {
     pub asked: f64,
     /// Relative error estimated; none where too few runs came to their end.
     pub reached: Option<f64>,
-    /// What increments and tolerance have of it.
+    /// Share of increments and tolerance.
     pub without_mesh: Option<f64>,
-    /// What the mesh has of it, where it counts.
+    /// Share of the mesh, if it counts.
     pub mesh: Option<ChosenMesh>,
     /// It is known to be at most what was asked for.
     pub is_reached: bool,
@@ -23,7 +23,7 @@ pub struct Chosen {
     pub worst: Option<String>,
     /// How the error was estimated.
     pub estimate: String,
-    /// Of the runs that tell the error of increments, so many cut steps back: their steps are shorter than their increments.
+    /// Number of the runs behind the error of increments that cut steps back: their steps are shorter than their increments.
     pub cut_back: usize,
     /// Increments by phase.
     pub increments: Vec<(String, usize)>,
@@ -71,7 +71,7 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// Of an estimated error, if there is one, and the one that was asked for.
+    /// Compares the estimated error, if known, with the requested one.
     pub fn of(estimated: Option<f64>, asked: f64) -> Self {
         match estimated {
             Some(error) if error <= asked => Self::Reached,

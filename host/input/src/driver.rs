@@ -64,7 +64,7 @@ pub(crate) struct DriverFile {
     /// What becomes of its scratch files.
     #[schemars(with = "Option<Scratch>")]
     scratch: Option<Spanned<Scratch>>,
-    /// UDSM: how its stiffness stands in memory; `columns`, as Fortran has it, if left out.
+    /// UDSM: how its stiffness is in memory; `columns`, as Fortran has it, if left out.
     #[schemars(with = "Option<Order>")]
     tangent_order: Option<Spanned<Order>>,
     /// Shear zone: its thickness, m. `law` is then a law of solids, or one of `laws`.
@@ -77,7 +77,7 @@ pub(crate) struct DriverFile {
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, LawInput>")]
     laws: Named<LawInput>,
-    /// What the driver is.
+    /// Title of the driver.
     #[serde(default)]
     title: String,
     /// Folders with law libraries, relative to the file.
@@ -198,9 +198,9 @@ pub struct Driver {
     figures: Vec<Figure>,
     source: Source,
     place_of_initial: Range<usize>,
-    /// What the file says, if it is a driver file.
+    /// Content of the file, if it is a driver file.
     file: Option<DriverFile>,
-    /// What the law's library is opened with, should it be built anew.
+    /// Settings for opening the law's library, should it be built again.
     opener: Opener,
 }
 
@@ -226,7 +226,7 @@ impl Driver {
         Self::build_all(opener, Source::read(path)?.with_settings(settings), true)
     }
 
-    /// As [`Driver::read_with`], whatever the lock beside the file says.
+    /// As [`Driver::read_with`], whatever the lock next to the file says.
     ///
     /// # Errors
     /// As [`Driver::read`].
@@ -247,7 +247,7 @@ impl Driver {
         }
     }
 
-    /// Takes the text of a driver file. `locked`: the lock beside it is honoured.
+    /// Takes the text of a driver file. `locked`: the lock next to it is honoured.
     ///
     /// # Errors
     /// As [`Driver::read`].

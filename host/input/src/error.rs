@@ -1,4 +1,4 @@
-//! What can go wrong from a file to a result, by who has to act; the program's exit code follows.
+//! Errors from file to result, by who has to act; the exit code follows from it.
 
 use law::Stopped;
 use mechanics::NoEquilibrium;
@@ -99,7 +99,7 @@ impl Error {
     }
 }
 
-/// What the user could do about an error of a simulation, whatever it is of.
+/// Hint for an error of a simulation.
 fn hint(error: &mechanics::Error) -> Option<String> {
     let hint = match error {
         mechanics::Error::CannotStart(failure)
@@ -118,7 +118,7 @@ fn hint(error: &mechanics::Error) -> Option<String> {
     Some(hint.to_owned())
 }
 
-/// What may lead on where no equilibrium was found and was not tried yet, and what is written of the run.
+/// Untried remedies if no equilibrium was found, and the files written by the run.
 fn after_no_equilibrium(none: &NoEquilibrium) -> String {
     let creep = none.control.relaxes().then_some(if none.crept {
         "`control = \"creep\"` in [solver], by whole increments, may lead on where short steps do not: what flows on its way \
@@ -197,7 +197,7 @@ pub enum Kind {
 }
 
 impl Error {
-    /// What was asked for does not fit what there is.
+    /// The request does not fit the files.
     pub fn usage(message: impl Into<String>) -> Self {
         text::Error::Usage(message.into()).into()
     }
@@ -239,7 +239,7 @@ impl Error {
         }
     }
 
-    /// What is said of it on a terminal, which may have colours, or elsewhere.
+    /// Its message on a terminal, with or without colours, or elsewhere.
     pub fn shown(&self, coloured: bool) -> String {
         text::shown(self, self.place(), self.help().as_deref(), coloured)
     }

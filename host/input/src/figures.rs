@@ -7,7 +7,7 @@ use results::wanted::{Cut, Figure};
 use text::{Source, suggestion};
 use toml::Spanned;
 
-/// What can be drawn along a cut; `k_0` is the ratio of radial to vertical stress, both
+/// Quantities along a cut; `k_0` is the ratio of radial to vertical stress, both
 /// effective. Without water pore pressures are zero.
 const CUT_QUANTITIES: [&str; 13] = [
     "x",

@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 use text::{Source, file};
 use toml::Spanned;
 
-/// What the case takes from the file.
+/// Names that the case takes from the file.
 struct Wanted<'c> {
     /// Numbers of groups, by the names of their surfaces.
     groups: HashMap<&'c str, usize>,
@@ -34,7 +34,7 @@ struct Wanted<'c> {
     scale: f64,
 }
 
-/// What the names of one kind in a file stand for.
+/// Meaning of the names of one kind in a file.
 type Counts = IndexMap<String, usize>;
 
 /// The mesh of a case that names a file, divided as often as the case says, with notes for the user.
@@ -121,7 +121,7 @@ fn unreadable(path: &Path, source: io::Error) -> text::Error {
 /// The whole mesh of a file in plane strain: every physical surface is a group, in their order.
 ///
 /// # Errors
-/// What is wrong with the file, and where.
+/// The defect of the file, and its place.
 pub fn whole(bytes: &[u8]) -> Result<Mesh, String> {
     let contents = Contents::read(bytes)?;
     let [points, curves, surfaces] = counts(&contents);
@@ -136,7 +136,7 @@ pub fn whole(bytes: &[u8]) -> Result<Mesh, String> {
     assemble::assemble(&contents, &wanted).map(|assembled| assembled.mesh)
 }
 
-/// What the case takes from the file, which must be there.
+/// Names that the case takes from the file; they must exist.
 fn wanted<'c>(
     source: &Source,
     file: &'c CaseFile,

@@ -1,10 +1,10 @@
-//! Choices of a case's solver that have no effect beside others.
+//! Choices of a case's solver that have no effect next to others.
 
 use crate::Case;
 use mechanics::Settings;
 use mechanics::settings::{Control, Method, Tangents};
 
-/// What is said of them, at their table in the file.
+/// Warning about them, at their table in the file.
 pub(crate) fn choices(case: &Case) -> Vec<String> {
     let place = case.source.place(&case.file.solver.span());
     let found = of(case.file.solver.get_ref()).into_iter();

@@ -1,9 +1,9 @@
-//! Input of the IncrementalDriver of A. Niemunis, which lies beside most soil models written as
+//! Input of the IncrementalDriver of A. Niemunis, which lies next to most soil models written as
 //! UMATs: `test.inp`, `parameters.inp` and `initialconditions.inp` in one folder.
 //!
 //! Lines are read as Fortran does: the numbers asked for, separated by blanks or commas, and
 //! whatever follows on the line is a remark, unless it is another number. Components are 11 22 33 12 13 23, tension positive,
-//! γ = 2ε. What is not read is refused with its line.
+//! γ = 2ε. Unsupported keywords are refused with their line.
 
 mod lines;
 mod restrictions;
@@ -37,7 +37,7 @@ struct Step {
     /// Time of the whole step.
     time: f64,
     frame: Frame,
-    /// Of every component whether its stress is controlled, and its change over the step.
+    /// For every component whether its stress is controlled, and its change over the step.
     linear: [(bool, f64); N_MAX],
     /// Amplitude and phase of every component, of `*CirculatingLoad`.
     harmonic: Option<[(f64, f64); N_MAX]>,
@@ -46,7 +46,7 @@ struct Step {
 }
 
 impl Driver {
-    /// Reads input of the IncrementalDriver: the test, and the two files beside it. The material is
+    /// Reads input of the IncrementalDriver: the test, and the two files next to it. The material is
     /// this UMAT.
     ///
     /// # Errors
@@ -101,7 +101,7 @@ impl Driver {
 }
 
 impl Driver {
-    /// Increments of a test; the two files beside it are read for `n` parameters and variables.
+    /// Increments of a test; the two files next to it are read for `n` parameters and variables.
     ///
     /// # Errors
     /// At what is not understood or cannot be done.
@@ -366,7 +366,7 @@ impl Step {
         self.harmonic.map_or(1, |_| self.increments)
     }
 
-    /// One segment, or as many as there are increments where they are not equal.
+    /// One segment, or all increments where they are not equal.
     fn segments(&self, number: u32) -> Vec<Segment> {
         let n = self.increments;
         let segment = |increments: usize, first: usize, change: &dyn Fn(usize) -> f64| Segment {

@@ -1,5 +1,5 @@
 //! Files that pose something to compute, and back: a case becomes a problem, a driver a path of one law,
-//! and what is wrong with either is said at its place in the file.
+//! and what is wrong with either is reported at its place in the file.
 
 pub mod build;
 pub mod calibration;

@@ -1,4 +1,4 @@
-//! Which libraries a case was meant for: `sha256` beside a law in the file, and a lock file beside
+//! Libraries that a case was made with: `sha256` next to a law in the file, and a lock file beside
 //! the case.
 //!
 //! A lock lists every law that the case uses. It is honoured wherever it stands: a case with

@@ -169,7 +169,7 @@ pub(crate) fn find_law(
     })
 }
 
-/// How a law comes here that is none of the contract.
+/// Route of a law from outside the contract.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 #[schemars(rename = "Adapter")]
@@ -185,7 +185,7 @@ pub enum Route {
 }
 
 impl Route {
-    /// What the library is made for; `None` if there is none.
+    /// Program that the library is made for; `None` if absent.
     fn adapter(self) -> Option<Adapter> {
         match self {
             Self::Umat => Some(Adapter::Umat),
@@ -339,7 +339,7 @@ pub(crate) fn shear_zone(
     Err(source.error(at, why).into())
 }
 
-/// What a file says beside `law` if the library is made for another program.
+/// Keys of a file besides `law` if the library is made for another program.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ForeignKeys<'a> {
     /// The key `adapter`.
@@ -364,7 +364,7 @@ impl ForeignKeys<'_> {
     /// The library; `None` if it is one of the contract. Paths are relative to the file.
     ///
     /// # Errors
-    /// [`text::Error::Input`] at a key that misses another, or a file that is not there.
+    /// [`text::Error::Input`] at a key that misses another, or a file that is absent.
     pub(crate) fn read(self, source: &Source) -> Result<Option<Foreign>, Error> {
         let path = |written: &Spanned<PathBuf>| {
             let file = source.path_at(&written.span());
@@ -499,7 +499,7 @@ impl ForeignKeys<'_> {
 }
 
 /// A law that a table describes by itself: the keys of one of a case's [`laws`](crate::case::CaseFile).
-/// `hypothesis` may be left out where the law offers one alone (beside interfaces in space), `folders` are looked
+/// `hypothesis` may be left out where the law offers one alone (next to interfaces in space), `folders` are looked
 /// in for its library first. Returns the law, and initial internal variables that override its own, by their numbers.
 ///
 /// # Errors

@@ -112,7 +112,7 @@ struct Table<'a> {
 }
 
 impl Table<'_> {
-    /// Where the column stands that a key names.
+    /// Position of the column that a key names.
     fn position(&self, key: &str, name: &Spanned<String>) -> Result<usize, Error> {
         let position = self
             .columns

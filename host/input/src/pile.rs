@@ -95,7 +95,7 @@ pub fn resolve(case: &Case, simulation: &Simulation) -> Result<Option<Pile>, Err
     Pile::new(parts, simulation).map(Some).map_err(placed)
 }
 
-/// Where a misfit is written, and what does not fit.
+/// Place of a mismatch, and the mismatch.
 fn told<'i>(misfit: &Misfit, input: &'i PileInput) -> (&'i Spanned<String>, &'static str) {
     match *misfit {
         Misfit::NotSolid(number) => (

@@ -21,7 +21,7 @@ use toml::Spanned;
 const COMPONENTS: [&str; 4] = ["11", "22", "33", "12"];
 /// Below this fraction of a load, the part of it in one direction is round-off.
 const NOTHING: f64 = 1e-9;
-/// Columns of `history.csv` beside the probes, and of `path.csv`, which only arc-length control
+/// Columns of `history.csv` next to the probes, and of `path.csv`, which only arc-length control
 /// writes.
 const OF_HISTORY: [&str; 4] = ["phase", "increment", "time", "iterations"];
 const OF_PATH: [&str; 4] = ["phase", "increment", "load_factor", "iterations"];

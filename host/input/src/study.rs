@@ -31,7 +31,7 @@ pub struct Study {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StudyFile {
-    /// What the study is.
+    /// Title of the study.
     #[serde(default)]
     pub title: String,
     /// The case: a case file, or a folder with `case.toml`, relative to this file.
@@ -93,7 +93,7 @@ impl Method {
         }
     }
 
-    /// Whether it chooses so many points as it is asked for.
+    /// Whether it chooses this many points as it is asked for.
     fn is_sampled(self) -> bool {
         matches!(self, Self::LatinHypercube | Self::Sobol | Self::Saltelli)
     }
@@ -121,7 +121,7 @@ pub struct ParameterInput {
     /// Normally distributed numbers between two bounds.
     #[schemars(with = "Option<NormalInput>")]
     pub normal: Option<Spanned<NormalInput>>,
-    /// In a `grid`: so many values of the distribution, equally probable parts apart, its ends among them.
+    /// In a `grid`: this many values of the distribution, equally probable parts apart, its ends among them.
     #[schemars(with = "Option<usize>", extend("minimum" = 1))]
     pub levels: Option<Spanned<usize>>,
     /// Whole numbers only.
@@ -174,7 +174,7 @@ pub struct OutputInput {
     pub phase: Option<Spanned<String>>,
 }
 
-/// Where a probe has a value.
+/// Place where a probe has a value.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AtInput {
@@ -198,9 +198,9 @@ pub struct Parameter {
     pub whole: bool,
     /// In a grid: values of a distribution.
     pub levels: Option<usize>,
-    /// Where the key stands in the file.
+    /// Place of the key in the file.
     key: Range<usize>,
-    /// Where the values stand.
+    /// Place of the values.
     values: Vec<Range<usize>>,
 }
 
@@ -274,7 +274,7 @@ impl Study {
         Ok(study)
     }
 
-    /// What the study is called: its folder if the file is `study.toml`, else the file's stem.
+    /// Name of the study: its folder if the file is `study.toml`, else the file's stem.
     pub fn name(&self) -> String {
         let path = self.source.path();
         let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
@@ -439,7 +439,7 @@ impl Study {
 }
 
 impl Parameter {
-    /// Where a value stands, or the key.
+    /// Place of a value, or of the key.
     fn place(&self, value: &Value, is_value: bool) -> Range<usize> {
         if !is_value {
             return self.key.clone();
@@ -466,7 +466,7 @@ fn is_equal(a: &Value, b: &Value) -> bool {
     }
 }
 
-/// Whether the keys of a parameter are keys of its own, beside those of earlier ones.
+/// Whether the keys of a parameter differ from those of earlier ones.
 fn check_keys(source: &Source, parameter: &Parameter, earlier: &[&str]) -> Result<(), Error> {
     let of =
         |key: &str| -> Vec<String> { key.split('.').map(|part| part.trim().to_owned()).collect() };
@@ -541,7 +541,7 @@ fn check_counts(source: &Source, file: &StudyFile) -> Result<(), Error> {
     }
 }
 
-/// What says which values there are: its key, where it stands, the values.
+/// Definition of the values: its key, its place, the values.
 type Given = (&'static str, Range<usize>, Spread);
 
 /// All of them that are given.

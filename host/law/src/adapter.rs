@@ -34,7 +34,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use text::Source;
 
-/// What a library is made for.
+/// The program that a library is made for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Adapter {
@@ -64,7 +64,7 @@ pub enum Externals {
     /// Its library is refused, with their names.
     #[default]
     Refuse,
-    /// Traps stand in their place: a call ends the worker process and names the routine.
+    /// Traps are in their place: a call ends the worker process and names the routine.
     Trap,
 }
 
@@ -78,7 +78,7 @@ impl Externals {
     }
 }
 
-/// How the stiffness that a routine leaves stands in memory.
+/// How the stiffness that a routine leaves is in memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Order {
@@ -113,11 +113,11 @@ pub enum Scratch {
 /// A library that is made for another program, as a file names it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Foreign {
-    /// What it is made for.
+    /// The program it is made for.
     pub adapter: Adapter,
     /// The library.
     pub library: PathBuf,
-    /// What describes it, if that is not where the adapter looks.
+    /// Its description, if not in the usual place.
     pub sidecar: Option<PathBuf>,
     /// Call it in this process and not in workers.
     pub in_process: bool,
@@ -129,12 +129,12 @@ pub struct Foreign {
     pub externals: Option<Externals>,
     /// What becomes of its scratch files; else the sidecar says it.
     pub scratch: Option<Scratch>,
-    /// How a UDSM leaves its stiffness; by columns if nothing is said.
+    /// How a UDSM leaves its stiffness; by columns if nothing is reported.
     pub tangent_order: Option<Order>,
 }
 
 impl Foreign {
-    /// A UMAT, with nothing said beside its library.
+    /// A UMAT, with nothing said next to its library.
     pub fn umat(library: &Path) -> Self {
         Self {
             adapter: Adapter::Umat,
@@ -184,7 +184,7 @@ pub(crate) trait ForeignInstance: Debug + Send + Sync {
     }
 
     /// Puts a number between the arguments of calls from now on, in front of that one or everywhere; the usual one if
-    /// there is none. In words where that is; `None` if there is no such place.
+    /// none exists. In words where that is; `None` if there is no such place.
     fn put_beside(&self, _gap: Option<usize>, _value: Option<f64>) -> Option<String> {
         None
     }
@@ -213,7 +213,7 @@ pub(crate) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Erro
     }
 }
 
-/// The sidecar beside a library, if there is one.
+/// The sidecar next to a library, if there is one.
 pub fn sidecar_of(library: &Path) -> Option<PathBuf> {
     sidecar::find(library).ok()
 }
@@ -229,7 +229,7 @@ pub fn sidecar(source: &Source) -> Result<LawDescription, Error> {
 /// Describes the behaviours in the bytes of a library.
 ///
 /// # Errors
-/// It has none that can be read.
+/// It has no readable description.
 pub fn behaviours(bytes: &[u8]) -> Result<Vec<LawDescription>, String> {
     mfront::describe(bytes)
 }
@@ -249,9 +249,9 @@ pub(crate) struct PointStart<'a> {
     pub(crate) time: f64,
     /// Time increment.
     pub(crate) time_increment: f64,
-    /// What is asked for: `PILUM_REQ_…`.
+    /// The request: `PILUM_REQ_…`.
     pub(crate) request: u32,
-    /// Which step and increment it is.
+    /// Numbers of step and increment.
     pub(crate) moment: Moment,
     /// Where the point lies.
     pub(crate) site: Site,

@@ -55,11 +55,11 @@ pub struct BuildFailure {
     pub law: String,
     /// The parameter that is concerned, if it is one.
     pub parameter: Option<String>,
-    /// What is wrong.
+    /// The defect.
     pub cause: BuildCause,
 }
 
-/// What is wrong with a law and its values.
+/// Defect of a law and its values.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BuildCause {
     /// The law has nothing to offer at all, for this reason.
@@ -77,7 +77,7 @@ pub enum BuildCause {
     Missing {
         /// Its unit.
         unit: String,
-        /// What it is.
+        /// Its kind.
         doc: String,
         /// All that have to be given, with their units.
         needed: Vec<String>,
@@ -94,16 +94,16 @@ pub enum BuildCause {
         value: String,
         /// The bounds.
         bounds: String,
-        /// What the parameter is.
+        /// The parameter.
         doc: String,
     },
     /// An angle that can only be meant in radians.
     Radians(f64),
-    /// The law refuses them for a reason of its own.
+    /// The law refuses them for its own reason.
     Refused(String),
     /// The library is at fault, not the values.
     Library {
-        /// Where it is.
+        /// Its place.
         library: String,
         /// What it did.
         reason: String,
@@ -170,7 +170,7 @@ impl BuildFailure {
 }
 
 impl LoadedLaw {
-    /// Fixes parameters by name under a hypothesis. What is left out takes its default.
+    /// Fixes parameters by name under a hypothesis. Omitted parameters take their default.
     ///
     /// # Errors
     /// The hypothesis or a value does not fit, or the library is at fault.

@@ -1,10 +1,10 @@
-//! What a law is asked and what it answers: points of a batch before and after an increment.
+//! Calls of a law and their results: points of a batch before and after an increment.
 
 use crate::Strided;
 use abi::status::Outcome;
 use serde::{Deserialize, Serialize};
 
-/// Which operator a call computes beside the fluxes.
+/// Which operator a call computes next to the fluxes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Operator {
     /// None.
@@ -41,7 +41,7 @@ impl Default for Site {
     }
 }
 
-/// Which step of the loading it is, for routines that ask.
+/// Number of the loading step, for routines that ask.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Moment {
     /// Phase, or segment of a driver, from 1.
@@ -88,7 +88,7 @@ pub struct Start<'a> {
     pub time_increment: f64,
     /// Which step and increment it is.
     pub moment: Moment,
-    /// Where the points lie; empty if the law does not ask ([`crate::Law::asks_for_sites`]).
+    /// Coordinates of the points; empty if the law does not ask ([`crate::Law::asks_for_sites`]).
     pub sites: &'a [Site],
 }
 
@@ -159,11 +159,11 @@ pub enum Request {
     InitialState,
 }
 
-/// A call of a law for one point: all that the answer depends on, beside the law and its
+/// A call of a law for one point: all that the answer depends on, next to the law and its
 /// parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointCall {
-    /// What is asked for.
+    /// The request.
     pub request: Request,
     /// Time at the start.
     pub time: f64,

@@ -1,5 +1,5 @@
-//! Which law this process is calling, for whom, and in which increment: written into memory that
-//! whoever watches over the process shares, so that it is known however the process ends. And
+//! The law that this process is calling, its caller and increment, in memory shared with the
+//! watching process, so that they are known however the process ends. And
 //! whether this process is still the one that called: a law may have made a copy of it.
 //!
 //! Writing costs a few nanoseconds for a call with a whole batch of points. Without a watcher there
@@ -12,7 +12,7 @@ use std::fmt::Write as _;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
-/// Threads that have a place of their own; more share the last.
+/// Threads with a separate place; others share the last.
 const THREADS: usize = 64;
 /// Words of a place.
 const WORDS: usize = 8;
@@ -50,7 +50,7 @@ struct Scope {
     per_element: u64,
 }
 
-/// What a law is doing.
+/// The current activity of a law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Doing {
     /// Fixing parameters.
@@ -151,7 +151,7 @@ pub fn remember_process() {
     });
 }
 
-/// A copy of the process that its user has made, and no law, is a process of its own.
+/// A copy of the process that its user has made, and no law, is a separate process.
 pub fn goes_on_as_copy() {
     if let Some(Some(word)) = ORIGINAL.get() {
         word.write(0, std::iter::once(1));
@@ -175,7 +175,7 @@ pub fn end_if_copy(report: impl FnOnce()) {
     }
 }
 
-/// Writes a text into so many words, cut where they end.
+/// Writes a text into this many words, cut where they end.
 pub fn write_text(memory: &SharedMemory, at: usize, n_words: usize, text: &str) {
     let mut end = text.len().min(8 * (n_words - 1));
     while !text.is_char_boundary(end) {

@@ -1,4 +1,4 @@
-//! A failed call of a law in a file of its own: everything the call depends on, so that it can be
+//! A failed call of a law in its own file: everything the call depends on, so that it can be
 //! repeated bit for bit, without the case it comes from.
 
 mod library;
@@ -33,7 +33,7 @@ pub struct Capsule {
     version: u32,
     /// Whose law was called.
     pub law: LawPart,
-    /// Where it comes from, by key.
+    /// Its origin, by key.
     #[serde(rename = "where", default)]
     pub origin: IndexMap<String, toml::Value>,
     /// What became of the call.
@@ -73,7 +73,7 @@ pub struct LawPart {
     pub library: PathBuf,
     /// SHA-256 of that.
     pub sha256: String,
-    /// What the library is made for, if not for the contract.
+    /// The program that the library is made for, if not for the contract.
     pub adapter: Option<Adapter>,
     /// What describes it.
     pub sidecar: Option<PathBuf>,
@@ -126,7 +126,7 @@ struct PointPart {
     end: Values,
 }
 
-/// Which step it is; laws of the contract do not ask.
+/// Number of the step; laws of the contract do not ask.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct MomentPart {
@@ -151,7 +151,7 @@ impl MomentPart {
     }
 }
 
-/// How long a phase or segment takes where nothing is said of it.
+/// How long a phase or segment takes where nothing is reported of it.
 fn one() -> f64 {
     1.0
 }
@@ -230,7 +230,7 @@ fn usual(request: &str, time: f64, time_increment: f64) -> Form {
     }
 }
 
-/// What capsules say of a library that keeps no contract, beside its file.
+/// What capsules say of a library that keeps no contract, next to its file.
 #[derive(Clone, Debug, Default)]
 struct Made {
     adapter: Option<Adapter>,

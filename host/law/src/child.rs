@@ -24,7 +24,7 @@ const MOST_OUTPUT: usize = 1 << 20;
 /// still hold them open.
 const LAST_WORDS: Duration = Duration::from_secs(5);
 
-/// What a child is to do, and within which limits.
+/// Task and limits of a child process.
 #[derive(Clone, Debug)]
 pub struct Work {
     /// Arguments of this program: the hidden command and its own arguments.
@@ -199,8 +199,8 @@ fn kill_group(child: &mut Child) {
     let _ = child.kill();
 }
 
-/// Reads to the end in a thread of its own, since a full pipe would stop the child. What a thread that cannot be
-/// had lacks is memory, above all.
+/// Reads to the end in its own thread, since a full pipe would stop the child. A thread that cannot
+/// be created mostly lacks memory.
 fn collect(source: Option<impl Read + Send + 'static>) -> io::Result<Receiver<Vec<u8>>> {
     let (sender, receiver) = channel();
     std::thread::Builder::new().spawn(move || {
@@ -367,7 +367,7 @@ mod tests {
         std::process::abort();
     }
 
-    /// What the child has started holds its output open; it must not keep the parent.
+    /// Processes started by the child hold its output open; they must not keep the parent waiting.
     #[test]
     #[cfg(unix)]
     fn a_hanging_child_is_killed_with_what_it_started() {

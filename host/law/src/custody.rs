@@ -1,6 +1,6 @@
-//! What belongs to the whole process, and a law that is called in it may change: the working
+//! State of the whole process that a law may change: the working
 //! folder, the limits, the standard streams. It is looked at after a law was built and before
-//! results are written, and set back as it was at the start. What is found while a library is loaded is said with the
+//! results are written, and set back as it was at the start. What is found while a library is loaded is reported with the
 //! first law of it that is built.
 
 use std::io;
@@ -19,7 +19,7 @@ struct Custody {
     streams: [Option<Identity>; 3],
 }
 
-/// What a file is, whatever it is called: its device and its number there.
+/// Identity of a file, whatever its name: its device and its number there.
 type Identity = (u64, u64);
 
 /// Remembers how it is, before the first law is opened. A program that never does is not watched.
@@ -37,7 +37,7 @@ pub fn begin() {
     });
 }
 
-/// What is to be said of libraries, and whether it was said. Of the whole process: a library is loaded for all of it.
+/// What is to be reported of libraries, and whether it was said. Of the whole process: a library is loaded for all of it.
 static REMARKS: Mutex<Vec<(String, bool)>> = Mutex::new(Vec::new());
 
 /// Has this said once, however often it is found.
@@ -48,7 +48,7 @@ pub(crate) fn remark(words: String) {
     }
 }
 
-/// What is to be said of libraries that this process has loaded, and was not said yet.
+/// What is to be reported of libraries that this process has loaded, and was not said yet.
 pub fn remarks() -> Vec<String> {
     let mut all = REMARKS.lock().unwrap_or_else(PoisonError::into_inner);
     let new = all.iter_mut().filter(|(_, is_said)| !is_said);

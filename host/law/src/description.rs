@@ -115,7 +115,7 @@ impl std::fmt::Display for Bounds {
     }
 }
 
-/// What the tangents of a law are worth to a solver.
+/// Quality of the tangents of a law for a solver.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Tangent {
@@ -124,7 +124,7 @@ pub enum Tangent {
     Consistent,
     /// They are near them, such as elastic ones: Newton's method gains nothing by renewing them.
     Approximate,
-    /// There are none: where one is wanted, the elastic operator stands in.
+    /// There are none: where one is wanted, the elastic operator is in.
     None,
 }
 
@@ -153,7 +153,7 @@ pub struct FormulationDescription {
     pub symmetric: bool,
     /// One constant tangent, no internal variables.
     pub linear: bool,
-    /// What its tangents are worth.
+    /// Quality of its tangents.
     #[serde(default, skip_serializing_if = "Tangent::is_consistent")]
     pub tangent: Tangent,
     /// It gives rates of its updates, by parameters too.

@@ -33,7 +33,7 @@ impl Image {
     /// Reads and hashes a file that not everybody may change.
     ///
     /// # Errors
-    /// What is wrong with the file, in words.
+    /// The defect of the file, in words.
     pub(crate) fn read(path: &Path) -> Result<Self, String> {
         let unreadable = |why: io::Error| format!("cannot be read: {why}");
         let warnings = trust::check_permissions(path)?;
@@ -115,7 +115,7 @@ fn loads_in_place() -> bool {
 /// An empty file in memory that may be sealed and executed.
 ///
 /// # Errors
-/// The system has none.
+/// The system lacks it.
 #[cfg(target_os = "linux")]
 pub(crate) fn memory_file(name: &str) -> io::Result<File> {
     use rustix::fs::{MemfdFlags, memfd_create};

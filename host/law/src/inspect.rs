@@ -71,7 +71,7 @@ pub struct Inspection {
     pub remarks: Vec<String>,
 }
 
-/// The handshake block as it stands in the file.
+/// The handshake block as it is in the file.
 #[derive(Clone, Debug, Serialize)]
 pub struct Handshake {
     /// Version of the contract, major and minor.

@@ -3,7 +3,7 @@
 //! A worker is this program again, with one law and its parameters. Host and worker take turns:
 //! the host writes a batch into shared memory and its size into a socket; the worker calls the
 //! law, writes the results into the memory and the outcome into the socket. A worker that is gone
-//! closes the socket. Each thread that calls at the same time has a worker of its own.
+//! closes the socket. Each thread that calls at the same time has its own worker.
 //!
 //! | words of the memory | |
 //! |---|---|
@@ -42,7 +42,7 @@ use std::time::{Duration, Instant};
 pub const COMMAND: &str = "law-worker";
 /// How long a worker may take to open its library and build its law.
 const START: Duration = Duration::from_secs(20);
-/// How long one call may take if nothing is said of it.
+/// How long one call may take if nothing is reported of it.
 const CALL: Duration = Duration::from_secs(10);
 /// How long a worker that is done with may take to write what it still keeps in buffers.
 const LEAVE: Duration = Duration::from_secs(1);
@@ -57,7 +57,7 @@ const REQUEST: usize = 12;
 /// Words of a point's place in the memory.
 const SITE: usize = 5;
 
-/// What a worker is told first.
+/// First message to a worker.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Start {
     path: OsString,
@@ -109,7 +109,7 @@ struct Worker {
     socket: UnixStream,
     memory: SharedMemory,
     output: Output,
-    /// Arguments that its routine has overwritten, beside the last answers.
+    /// Arguments that its routine has overwritten, next to the last answers.
     overwritten: Vec<String>,
     /// It does not answer, or not any more.
     is_silent: bool,
@@ -432,7 +432,7 @@ pub fn memory_file() -> io::Result<File> {
 /// What a library says about its laws, asked in a worker. `foreign`: what it is made for, if not for the contract.
 ///
 /// # Errors
-/// What is wrong with the library, in words.
+/// The defect of the library, in words.
 pub(crate) fn describe(
     path: &Path,
     sha256: &str,
@@ -464,7 +464,7 @@ pub(crate) fn describe(
     Ok(laws.into_iter().map(apart).collect())
 }
 
-/// A law with its parameters fixed, in processes of its own.
+/// A law with its parameters fixed, in separate processes.
 #[derive(Debug)]
 pub(crate) struct IsolatedInstance {
     start: Start,
@@ -474,9 +474,9 @@ pub(crate) struct IsolatedInstance {
     idle: Mutex<Vec<Worker>>,
     /// Whose turn it is, if calls must follow one another. They then share one worker.
     turn: Option<Mutex<()>>,
-    /// Arguments that its routine has overwritten in any worker, and how many of them are told.
+    /// Arguments that its routine has overwritten in any worker, and the number reported.
     overwritten: Mutex<(Vec<String>, usize)>,
-    /// Where they work, if not where the program does.
+    /// Their working folder, if it is not that of the program.
     scratch: Option<Scratch>,
     printed: Arc<Printed>,
 }
@@ -641,10 +641,10 @@ fn no_folder(why: &io::Error) -> (Status, String) {
 /// Stands for a law without `init_state`: no status code of the contract.
 const NO_INIT_STATE: Status = Status::MIN;
 
-/// What a worker does: opens its library, builds its law, and answers calls until the host is gone.
+/// A worker opens its library, builds its law, and answers calls until the host is gone.
 ///
 /// # Errors
-/// The socket or the memory fails. A host that is gone is none.
+/// The socket or the memory fails. A host that has ended is no error.
 pub fn work() -> Result<(), Error> {
     serve().map_err(|why| Error::internal(format!("worker: {why}")))
 }
@@ -872,7 +872,7 @@ impl Bench {
     }
 }
 
-/// What is said of a law that forks.
+/// What is reported of a law that forks.
 const COPIED: &str = "the law made a copy of its process (fork)";
 
 /// Whether a law has made a copy of this process. The copy ends here: it must not answer, too.

@@ -23,7 +23,7 @@ pub struct Law {
     pub(crate) formulation: FormulationDescription,
     pub(crate) parameters: Vec<f64>,
     pub(crate) instance: LawInstance,
-    /// What it is called where calls are watched.
+    /// Its name where calls are watched.
     pub(crate) name: u64,
     /// What it had changed of the process as it was built.
     pub(crate) changes: Vec<String>,
@@ -76,14 +76,14 @@ impl LawInstance {
 /// Why a law's response depends on how long an increment takes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TimeDependence {
-    /// The law says so.
+    /// The law reports it.
     Declared,
     /// A parameter is a time or a rate: its id, value and unit.
     By(String, f64, String),
 }
 
 impl std::fmt::Display for TimeDependence {
-    /// What is put behind the law's name: nothing, or the parameter in parentheses.
+    /// Suffix of the law's name: nothing, or the parameter in parentheses.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Declared => Ok(()),
@@ -128,7 +128,7 @@ impl Law {
         &self.parameters
     }
 
-    /// Whether its response is known to depend on how long an increment takes, and by what: it says so, or a
+    /// Whether its response is known to depend on how long an increment takes, and by what: it reports it, or a
     /// parameter is a time or a rate, by its unit, and is not 0.
     pub fn time_dependence(&self) -> Option<TimeDependence> {
         if self.formulation.time_dependent {
@@ -192,7 +192,7 @@ impl Law {
         failure.outcome == Outcome::Numeric && (is_foreign || failure.claims_success)
     }
 
-    /// Whether the law is told where its points lie.
+    /// Whether the law receives the coordinates of its points.
     pub fn asks_for_sites(&self) -> bool {
         self.library().foreign().is_some()
     }
@@ -286,11 +286,11 @@ impl Law {
         }
     }
 
-    /// What the law makes of a point that carries this flux and has no history, over an increment without
-    /// any gradient: its flux and its operator, row by row (empty if none is wanted).
+    /// Response of the law at a point with this flux and no history, over an increment without
+    /// any gradient: its flux and its operator, row by row (empty if not requested).
     ///
     /// # Errors
-    /// The law cannot start from the flux, or cannot leave it as it is.
+    /// The law cannot start from the flux, or cannot leave it unchanged.
     pub fn at_rest(
         &self,
         flux: &[f64],
@@ -323,8 +323,8 @@ impl Law {
         Ok((flux_end, written))
     }
 
-    /// Carries points over an increment. Of a law without a consistent tangent the elastic operator
-    /// stands in for it.
+    /// Carries points over an increment. A law without a consistent tangent gives the elastic
+    /// operator instead.
     ///
     /// # Errors
     /// A point asks for a smaller step, or fails; also if it claims success with a result that
@@ -430,7 +430,7 @@ thread_local! {
 }
 
 impl Outcomes {
-    /// Outcomes of so many points as they are before a law has written them.
+    /// Outcomes of this many points as they are before a law has written them.
     fn unwritten(&mut self, n_points: usize) -> (&mut [Status], &mut [f64]) {
         self.status.clear();
         self.status.resize(n_points, raw::PILUM_E_INTERNAL);
@@ -492,7 +492,7 @@ fn judge(
     }
 }
 
-/// What is said of a success that is none.
+/// The error of a call that reports success wrongly.
 const NOT_FINITE: &str = "the law claims success with a result that is not finite";
 
 /// Distrusts success: every output must be finite. Compiled where batches are called, with what

@@ -81,8 +81,9 @@ unsafe impl Sync for LawHandle {}
 /// `dlerror` is not safe in threads everywhere, so libraries are opened one at a time.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
-/// Libraries that this process has loaded, by SHA-256. Of the whole process by nature: none is ever
-/// unloaded, and the same bytes loaded again for each [`Opener`](crate::Opener) would only pile up.
+/// Libraries that this process has loaded, by SHA-256. One list for the whole process: libraries
+/// are never unloaded, and the same bytes loaded again for each [`Opener`](crate::Opener) would
+/// only pile up.
 /// Whether a library may be used is its opener's decision, made before it is looked for here.
 static LOADED: Mutex<Vec<(String, OpenLibrary)>> = Mutex::new(Vec::new());
 
@@ -90,7 +91,7 @@ static LOADED: Mutex<Vec<(String, OpenLibrary)>> = Mutex::new(Vec::new());
 /// hashed where the system allows it.
 ///
 /// # Errors
-/// What is wrong with the library, in words.
+/// The defect of the library, in words.
 pub(crate) fn open(path: &Path, image: Image) -> Result<OpenLibrary, String> {
     let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((_, library)) = loaded.iter().find(|(sha256, _)| *sha256 == image.sha256) {
@@ -137,7 +138,7 @@ fn load_and_describe(path: &Path, image: Image) -> Result<OpenLibrary, String> {
     describe(&plugin)
 }
 
-/// Loads the hashed bytes. Where that fails (a library that looks for others beside itself, a
+/// Loads the hashed bytes. Where that fails (a library that looks for others next to itself, a
 /// system that executes nothing from memory), the file is loaded, if it is still the same: the
 /// loader runs nothing of a library it cannot load.
 ///
@@ -180,7 +181,7 @@ unsafe fn load(file: &Path, path: &Path) -> Result<libloading::Library, libloadi
 /// Stack of the thread in which initialisers run: as large as that of a main thread.
 const STACK: usize = 8 << 20;
 
-/// Opens the library at `path` in a thread of its own. What its initialisers do to the arithmetic of their thread, as
+/// Opens the library at `path` in its own thread. What its initialisers do to the arithmetic of their thread, as
 /// those that `-Ofast` links do, ends with that thread. Where there can be none it is opened in this one.
 fn apart<T: Send>(path: &Path, open: impl Fn() -> T + Sync) -> T {
     let watched = || {

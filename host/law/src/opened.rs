@@ -30,7 +30,7 @@ pub struct Library {
     pub(crate) call_limit: Option<Duration>,
 }
 
-/// Where a law is called.
+/// The process in which a law is called.
 #[derive(Clone, Debug)]
 pub(crate) enum Origin {
     /// In this process.
@@ -43,7 +43,7 @@ pub(crate) enum Origin {
         /// Calls of one material must follow one another.
         is_serial: bool,
     },
-    /// Where the law of solids is that fills this zone.
+    /// Place of the law of solids that fills this zone.
     Zone(ShearZone, Box<LoadedLaw>),
 }
 
@@ -130,7 +130,7 @@ impl LoadedLaw {
         &self.library
     }
 
-    /// Calls `create` as a check does. Of a law behind an adapter, that takes its place.
+    /// Calls `create` as a check does. For a law behind an adapter, its replacement.
     ///
     /// # Errors
     /// There is no memory, or the law is in a worker process.

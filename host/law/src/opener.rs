@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::SystemTime;
 
-/// What libraries are opened with. The program makes one and hands it down; two of them know nothing
+/// Settings for opening libraries. The program makes one and hands it down; two of them know nothing
 /// of each other. Copies share what is opened.
 ///
 /// The default neither probes nor isolates, and records nothing.
@@ -129,7 +129,7 @@ impl Opener {
     }
 
     /// Opens a library that is made for another program, if its SHA-256 is approved. Its code runs
-    /// in worker processes unless it is said to run in this one.
+    /// in worker processes unless it is reported to run in this one.
     ///
     /// # Errors
     /// [`Error::Library`] with the path and what is wrong, and those of `approve`.
@@ -191,7 +191,7 @@ impl Opener {
         }))
     }
 
-    /// As a file names it, and with what was asked for beside it.
+    /// As a file names it, and with what was asked for next to it.
     fn completed(&self, foreign: &Foreign) -> Foreign {
         let mut foreign = foreign.clone();
         if foreign.adapter == Adapter::Umat && foreign.record.is_none() {

@@ -1,4 +1,4 @@
-//! Which libraries a file was meant for: `sha256` beside a law in the file, and a lock beside it.
+//! Which libraries a file was meant for: `sha256` next to a law in the file, and a lock next to it.
 
 use crate::Error;
 use serde::Deserialize;
@@ -31,7 +31,7 @@ struct LockedLaw {
 struct Pin {
     law: String,
     sha256: String,
-    /// Where it is written, and what to do if it does not hold.
+    /// Its place, and the remedy if it does not hold.
     place: String,
     hint: String,
 }
@@ -46,7 +46,7 @@ pub struct Pins {
 }
 
 impl Pins {
-    /// Those of a file: of each law its id and its `sha256`, if it has one; and the lock beside the
+    /// Those of a file: of each law its id and its `sha256`, if it has one; and the lock next to the
     /// file.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! Where libraries are looked for. Only explicit folders count, never the working directory.
+//! Folders in which libraries are searched. Only explicit folders count, never the working directory.
 
 use super::adapter::Foreign;
 use super::{Library, LoadedLaw, Opener};
@@ -127,7 +127,7 @@ impl SearchPath {
     /// like the law, else the one whose manifest lists it. Libraries are opened once.
     ///
     /// # Errors
-    /// [`Error::Library`] if there is none, if two libraries of a folder claim the law, or if the
+    /// [`Error::Library`] if absent, if two libraries of a folder claim the law, or if the
     /// library cannot be used.
     pub fn law(&self, id: &str) -> Result<LoadedLaw, Error> {
         for Place { folder, .. } in &self.places {

@@ -75,7 +75,7 @@ impl ShearZone {
 }
 
 impl ShearZone {
-    /// What is seldom meant, in words.
+    /// Warnings about implausible values.
     pub(crate) fn implausible(self, law: &str) -> Option<String> {
         let [least, most] = USUAL;
         let thickness = self.thickness;
@@ -109,7 +109,7 @@ impl fmt::Display for ShearZone {
     }
 }
 
-/// What a zone evaluates its law in: all strains along the zone and out of plane are 0, so that the
+/// Hypothesis in which a zone evaluates its law: all strains along the zone and out of plane are 0, so that the
 /// hypotheses differ by their components only.
 fn hypothesis(law: &LawDescription) -> Option<Hypothesis> {
     let solids = [
@@ -145,7 +145,7 @@ impl LoadedLaw {
     /// and internal variables, and the zone's stresses.
     ///
     /// # Errors
-    /// The law is none of solids, or the zone does not fit; in words.
+    /// The law is not for solids, or the zone does not fit; in words.
     pub fn in_shear_zone(&self, zone: ShearZone) -> Result<Self, String> {
         if let Some((_, why)) = zone.fault() {
             return Err(why);

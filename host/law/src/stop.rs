@@ -49,7 +49,7 @@ impl Stop {
         Self::asked_by(move || flag.load(Ordering::Relaxed), |_| {})
     }
 
-    /// Asked as soon as `asked` says so, which is called very often. `beat` is told how long every
+    /// Asked as soon as `asked` reports it, which is called very often. `beat` is told how long every
     /// piece of work took that was not to be interrupted.
     pub fn asked_by(
         asked: impl Fn() -> bool + Send + Sync + 'static,

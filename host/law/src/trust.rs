@@ -1,4 +1,4 @@
-//! What libraries are trusted with. A library has all rights of the user once it is opened; these rules
+//! Trust in libraries. A library has all rights of the user once it is opened; these rules
 //! prevent accidents and surprises, not attacks by the user's own programs.
 
 use std::path::Path;

@@ -1,8 +1,8 @@
 //! Libraries that are not known yet are tried in a child process first: what crashes, hangs or eats
 //! all memory does so there.
 //!
-//! What passed is remembered by its SHA-256 and the version of this program, so that it is tried
-//! once. What did not is tried again every time.
+//! Libraries that passed are remembered by SHA-256 and program version, so that each is tried once.
+//! Others are tried again every time.
 
 use super::{End, Law, LoadedLaw, Moment, Opener, Operator, ParameterDescription, Start, Strided};
 use crate::Error;
@@ -28,8 +28,8 @@ const REFUSED: &str = "refused";
 /// Points of a call.
 const N_POINTS: usize = 3;
 
-/// Tries a library in a child process, unless that was done. What is refused in an orderly way is
-/// left to this process: it finds the same, in its own words.
+/// Tries a library in a child process, unless that was done. Orderly refusals are left to this
+/// process, which finds the same.
 ///
 /// # Errors
 /// [`Error::Library`]: what the library did in the child. [`text::Error::Usage`]: there is not the memory for one.
@@ -114,7 +114,7 @@ fn remember(file: &Path) {
     let _ = std::fs::write(file, "");
 }
 
-/// What the child does: opens the library, reads its description, and calls each law a few times.
+/// The child opens the library, reads its description, and calls each law a few times.
 ///
 /// # Errors
 /// [`text::Error::Internal`] if the child cannot set its limits or speak.

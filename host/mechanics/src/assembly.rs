@@ -42,7 +42,7 @@ pub fn fold(ties: &[Tie], force: &mut [f64]) {
     }
 }
 
-/// Of every degree of freedom, whether elements at these nodes use it: those that are tied use what they follow.
+/// For every degree of freedom, whether elements at these nodes use it: those that are tied use what they follow.
 pub(crate) fn used(nodes: impl Iterator<Item = usize>, ties: &[Tie], n_dofs: usize) -> Vec<bool> {
     let mut used = vec![false; n_dofs];
     for node in nodes {
@@ -76,16 +76,16 @@ pub struct System {
     /// Degree of freedom of every equation.
     free: Vec<usize>,
     ties: Vec<Tie>,
-    /// Of every group, its elements; none of a group that does not take part.
+    /// For every group, its elements; an empty list if the group does not take part.
     elements: Vec<Vec<ElementMap>>,
-    /// Degrees of freedom that are shared with a domain beside the groups.
+    /// Degrees of freedom that are shared with a condensed domain.
     boundary: Vec<usize>,
     /// Pattern of the matrix of the groups.
     pub pattern: Arc<Pattern>,
 }
 
 /// The degrees of freedom that take part in the iterations, used by the groups or prescribed: those
-/// of a large domain beside them are not touched. A vector *by place* has an entry for each.
+/// inside a large condensed domain are not touched. A vector *by place* has an entry for each.
 #[derive(Debug)]
 pub struct Places {
     /// Degrees of freedom, ascending.
@@ -103,7 +103,7 @@ pub struct Places {
     ties: Vec<Tie>,
 }
 
-/// Which body things belong to; the lists are empty if there is but one.
+/// The body of each item; the lists are empty if there is only one body.
 #[derive(Debug, Default)]
 pub struct PlacesOfBodies {
     /// How many bodies there are.
@@ -123,7 +123,7 @@ pub struct PlacesOfBodies {
 }
 
 impl Places {
-    /// Of a system.
+    /// For a system.
     pub fn new(system: &System, prescribed: &[bool]) -> Self {
         let mut takes_part = prescribed.to_vec();
         for &dof in system.elements.iter().flatten().flat_map(|map| &map.dofs) {
@@ -315,7 +315,7 @@ impl System {
         (system, result)
     }
 
-    /// Of all elements the positions of their entries in the matrix, and the first and the last of them; in pieces.
+    /// For all elements, in pieces: the positions of their entries in the matrix, and the first and the last of them.
     fn slots(&self) -> Vec<Vec<(Vec<u32>, [u32; 2])>> {
         let pieces = self.elements.iter().flat_map(|maps| maps.chunks(PIECE));
         let of_map = |map: &ElementMap| {
@@ -368,7 +368,7 @@ impl System {
         self.equation[dof]
     }
 
-    /// Degrees of freedom that the groups share with the domain beside them.
+    /// Degrees of freedom that the groups share with the condensed domain.
     pub fn boundary(&self) -> &[usize] {
         &self.boundary
     }

@@ -45,8 +45,9 @@ pub struct Axes {
     pub across: [f64; 2],
 }
 
-/// The component of a direction that says whether coordinates increase along it: the larger one. Of
-/// equals it is the second one, in round-off too, so that the elements of a straight line agree.
+/// The component of a direction that says whether coordinates increase along it: the larger one. If
+/// both are equal, also within round-off, it is the second one, so that the elements of a straight
+/// line agree.
 pub(crate) fn increase([x, y]: [f64; 2]) -> f64 {
     const EQUAL: f64 = 1e-6;
     if x.abs() > (1.0 + EQUAL) * y.abs() {
@@ -76,8 +77,8 @@ impl Axes {
         }
     }
 
-    /// The same turned so that the first one lies along a direction, without turning round: of a
-    /// curve beside its chord.
+    /// The same axes, turned so that the first one lies along a direction without reversing: for a
+    /// curve and its chord.
     #[must_use]
     pub fn turned_along(&self, direction: [f64; 2]) -> Self {
         let length = direction[0].hypot(direction[1]);
@@ -136,7 +137,7 @@ pub trait Kinematics: std::fmt::Debug + Send + Sync {
     fn position(&self, point: usize) -> [f64; 2];
     /// Weight of an integration point: the volume (of an interface: the area) it stands for.
     fn weight(&self, point: usize) -> f64;
-    /// What of an element's volume each of its nodes stands for, ∫ N dV; nothing of interfaces.
+    /// Volume of an element shared among its nodes, ∫ N dV; empty for interfaces.
     fn volumes(&self, element: usize) -> &[f64];
     /// Characteristic length of an element: the square root of its area, of an interface its
     /// length.
@@ -166,7 +167,7 @@ pub trait Kinematics: std::fmt::Debug + Send + Sync {
     fn stiffness(&self, element: usize, tangent: &[f64], out: &mut [f64]);
 }
 
-/// What a unit of area in the plane stands for.
+/// Volume per unit of area in the plane.
 pub fn depth(analysis: Analysis, x: f64) -> f64 {
     match analysis {
         Analysis::Axisymmetric => 2.0 * std::f64::consts::PI * x,

@@ -1,4 +1,4 @@
-//! What can go wrong with a simulation, as data; the sentences for it stand below.
+//! Errors of a simulation, as data, with their messages.
 
 use crate::equilibrium::StepFailure;
 use crate::group::PointFailure;
@@ -76,7 +76,7 @@ pub struct NoEquilibrium {
     pub control: Control,
     /// Under `auto` creep led, by short steps, and led no further.
     pub crept: bool,
-    /// Where iterations stand still, the settings let relaxation or creep lead on.
+    /// The settings allow viscous relaxation or viscous control if iterations stall.
     pub may_move: bool,
     /// The last attempt: reason, both criteria with residuals, the point that failed.
     pub failure: StepFailure,

@@ -1,7 +1,7 @@
 //! Ground at rest and under water: weights, pore pressures, the stress before the first phase.
 //!
-//! Stresses of groups are effective. What water adds to them is known from the water table alone, so it
-//! stands on the side of the loads: with total stresses σ' − p δ, equilibrium is
+//! Stresses of groups are effective. The pore pressure follows from the water table alone, so it is
+//! a load: with total stresses σ' − p δ, equilibrium is
 //!
 //! - ∫ Bᵀ σ' dV = f + ∫ Bᵀ p δ dV (1)
 //!

@@ -14,23 +14,23 @@ use abi::Hypothesis;
 use law::Operator;
 use std::collections::{HashMap, HashSet};
 
-/// A layer whose one side is so many times the other has no doubt about its normal.
+/// If one side of a layer is this many times the other, its normal is unambiguous.
 const CLEARLY: f64 = 2.0;
 
 /// An effective stress at rest that is less than this part of the weight and the water of which it is the
 /// difference is none.
 const ROUND_OFF_AT_REST: f64 = 1e-9;
 
-/// What a problem is made of once its elements stand.
+/// A problem with its elements.
 #[derive(Debug)]
 pub struct Model {
     /// Groups, with the laws of the first phase.
     pub groups: Vec<Group>,
     /// Mid-thickness nodes that follow the two faces of a thin layer.
     pub ties: Vec<Tie>,
-    /// Of every phase but the first, the groups that take another law.
+    /// For every phase but the first, the groups that take another law.
     pub swaps: Vec<Vec<(usize, Material)>>,
-    /// What is plausible but seldom meant, in words.
+    /// Warnings about implausible input.
     pub warnings: Vec<String>,
 }
 
@@ -204,7 +204,7 @@ struct Ties {
     dofs: HashSet<usize>,
 }
 
-/// Which parametric direction of a quad goes across the layer.
+/// The parametric direction of a quad across the layer.
 #[derive(Clone, Copy, PartialEq)]
 enum Across {
     Xi,
@@ -266,7 +266,7 @@ impl GroupBuilder<'_> {
         Refusal::new(Item::Group(self.number), cause)
     }
 
-    /// What is said of the group under a key does not fit.
+    /// A key of the group does not fit.
     fn refuse_key(&self, key: Key, cause: Cause) -> Refusal {
         Refusal::new(Item::GroupKey(self.number, key), cause)
     }

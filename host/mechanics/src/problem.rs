@@ -1,4 +1,4 @@
-//! What is to be computed, as plain values: mesh, groups with their laws, supports, phases with their
+//! A problem as plain values: mesh, groups with their laws, supports, phases with their
 //! loads, settings. Units: kN, m, kPa; tension positive.
 
 pub(crate) mod alike;
@@ -194,15 +194,15 @@ pub struct Phase {
     pub name: String,
     /// Number of equal increments.
     pub increments: usize,
-    /// How long it takes, in the unit of time of the laws; 1 if nothing is said.
+    /// How long it takes, in the unit of time of the laws; 1 by default.
     pub time: Option<f64>,
     /// Laws of groups, by number, from this phase on.
     pub materials: Vec<(usize, Material)>,
-    /// Groups, by number, that are there from this phase on: solids free of stress, interfaces with
-    /// the stress beside them.
+    /// Groups, by number, that are active from this phase on: solids free of stress, interfaces
+    /// with the adjacent stress.
     pub activate: Vec<usize>,
-    /// Groups, by number, that are not there from this phase on. What they carried is released in its
-    /// course; faces of zero-thickness elements become one.
+    /// Groups, by number, that are not there from this phase on. Their forces are released over the
+    /// phase; faces of zero-thickness elements become one.
     pub deactivate: Vec<usize>,
     /// Unit weights of groups, by number, above and below the water, kN/m³, as at the end of the phase.
     pub unit_weight: Vec<(usize, f64)>,
@@ -210,8 +210,8 @@ pub struct Phase {
     pub water_level: Option<Profile>,
     /// Whether pore water of groups, by number, leaves freely from this phase on.
     pub drainage: Vec<(usize, Drainage)>,
-    /// Lines whose nodes move alike from this phase on: in both directions, without rotation. Where a
-    /// line reaches the axis of symmetry it does not move radially.
+    /// Lines whose nodes move alike from this phase on: in both directions, without rotation. A
+    /// line that reaches the axis of symmetry does not move radially.
     pub rigid: Vec<String>,
     /// What the phase changes, as a factor on the change, by the share of the phase's time, from 0 to 1: pairs of
     /// time and factor, linear between. Empty: a straight ramp from 0 to 1.
@@ -369,7 +369,7 @@ impl Formulation {
     }
 }
 
-/// Where the law is evaluated, and with which strains.
+/// Integration points of the law, and its strains.
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum Integration {
@@ -393,6 +393,6 @@ pub enum Integration {
 pub enum InPlane {
     /// E*, ν* of equations (18), (19).
     Elastic,
-    /// None: stresses along the layer stay as they are.
+    /// None: stresses along the layer stay unchanged.
     None,
 }

@@ -6,8 +6,8 @@
 //! corners is the estimated error (recovery by patches, after Zienkiewicz & Zhu 1992).
 //!
 //! Strains come from the displacements of the nodes alone, so no law is asked. Neighbours are elements of the same
-//! group that share a node: strains may jump from group to group, and across an interface. Where the ground yields,
-//! strains need not be smooth, and an estimate says where they are not.
+//! group that share a node: strains may jump from group to group, and across an interface. In
+//! plastic ground strains need not be smooth, and the estimate shows the places.
 
 mod fit;
 
@@ -42,14 +42,14 @@ type Strain = [f64; 4];
 /// The estimated error of the strains on a mesh.
 #[derive(Clone, Debug, Default)]
 pub struct MeshError {
-    /// By group; none where it is not estimated: of interfaces and layers, of what is not there, of a
+    /// By group; none where it is not estimated: of interfaces and layers, of what is absent, of a
     /// few elements.
     groups: Vec<Option<GroupError>>,
     /// Over all of them.
     all: Sums,
 }
 
-/// Of one group.
+/// For one group.
 #[derive(Clone, Debug)]
 struct GroupError {
     /// ∫ |ε* − ε|² dV of every element.
@@ -101,7 +101,7 @@ impl MeshError {
     }
 }
 
-/// Of sums; what is fitted has about the strains and the error together.
+/// The error relative to the strains and the error together, from sums of squares.
 fn ratio([error, strains, volume]: Sums) -> Option<f64> {
     let is_strained = strains > UNSTRAINED * UNSTRAINED * volume;
     is_strained.then(|| (error / (strains + error)).sqrt())
@@ -117,7 +117,7 @@ fn square(strain: Strain) -> f64 {
     e_11 * e_11 + e_22 * e_22 + e_33 * e_33 + 0.5 * gamma * gamma
 }
 
-/// What a point of an element has.
+/// Data of a point of an element.
 #[derive(Clone, Copy, Debug)]
 struct Point {
     at: [f64; 2],
@@ -137,9 +137,9 @@ struct View<'a> {
 /// How strains of an element are looked at.
 #[derive(Clone, Copy)]
 enum Points {
-    /// Where they are best.
+    /// The superconvergent points.
     Best,
-    /// Where they are integrated.
+    /// The integration points.
     All,
 }
 
@@ -259,7 +259,7 @@ struct Patches {
     corners: Vec<Vec<usize>>,
     /// Elements at each of them.
     elements: Vec<Vec<usize>>,
-    /// What is fitted at each, and to how many points; none to few.
+    /// The polynomial at each corner and its number of points; no polynomial if they are few.
     fits: Vec<Option<(usize, Fit)>>,
 }
 

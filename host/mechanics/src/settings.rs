@@ -20,8 +20,8 @@ pub struct Settings {
     #[serde(deserialize_with = "tolerance")]
     pub displacement_tolerance: f64,
     /// Residual, relative as `force_tolerance`, that is tolerated where Newton iterations and relaxation come to a
-    /// standstill above the tolerance and displacements have settled to a tenth of the increment; each is
-    /// said, and counted in the summary. 0 tolerates none.
+    /// standstill above the tolerance and displacements have settled to a tenth of the increment;
+    /// each is reported, and counted in the summary. 0 tolerates none.
     #[serde(deserialize_with = "tolerated")]
     pub tolerated_residual: f64,
     /// What counts as equilibrium.
@@ -29,7 +29,7 @@ pub struct Settings {
     /// Iterations after which an increment is cut back; those of the method if left out.
     #[serde(deserialize_with = "iterations")]
     pub max_iterations: Option<usize>,
-    /// An increment is halved at most so many times; where creep leads, at least to a 64th of it.
+    /// Maximum number of halvings of an increment; at least six under viscous control.
     #[serde(deserialize_with = "halvings")]
     pub max_halvings: u32,
     /// Whether to search along a correction that makes the residual grow.
@@ -84,7 +84,7 @@ impl Settings {
 }
 
 impl Settings {
-    /// What the iterations are asked for: without a limit to the last correction where the residual alone
+    /// Criteria of the iterations: without a limit to the last correction if the residual alone
     /// decides.
     #[must_use]
     pub fn in_force(self) -> Self {
@@ -178,7 +178,7 @@ pub enum Tangents {
     Differences,
 }
 
-/// Which tolerances a state has to meet.
+/// Tolerances of a state.
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Convergence {
@@ -186,8 +186,8 @@ pub enum Convergence {
     #[default]
     Both,
     /// That of the residual alone, for curves whose displacements drift while the load is known: with a
-    /// `force_tolerance` of 1e-2 to 1e-4 the tolerated error of geotechnical programs. What the corrections
-    /// leave open is said at the end of the phase; reactions and loads have to balance all the same.
+    /// `force_tolerance` of 1e-2 to 1e-4 the tolerated error of geotechnical programs. The end of
+    /// the phase reports the open corrections; reactions and loads still have to balance.
     Force,
 }
 

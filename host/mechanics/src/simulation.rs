@@ -45,7 +45,7 @@ use state::PhaseCourse;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
-/// What there is to see of a state of equilibrium.
+/// View of a state of equilibrium.
 #[derive(Clone, Copy, Debug)]
 pub struct Snapshot<'a> {
     /// The mesh.
@@ -200,7 +200,7 @@ impl Simulation {
         Ok(simulation)
     }
 
-    /// What it has factorised, for other simulations.
+    /// Its factors, for other simulations.
     pub fn into_reuse(self) -> Reuse {
         self.reuse
     }
@@ -215,12 +215,12 @@ impl Simulation {
         &self.groups
     }
 
-    /// Of every phase but the first, the groups that take another law.
+    /// For every phase but the first, the groups that take another law.
     pub fn swaps(&self) -> &[Vec<(usize, Material)>] {
         &self.swaps
     }
 
-    /// What is plausible in the problem but seldom meant, in words.
+    /// Warnings about implausible input.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }

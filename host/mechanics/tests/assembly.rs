@@ -1,4 +1,4 @@
-//! Matrices of elements that are kept: added up to the same bits as those that are computed anew, in the room that was
+//! Matrices of elements that are kept: added up to the same bits as those that are computed again, in the room that was
 //! announced.
 #![allow(clippy::unwrap_used, reason = "tests panic to fail")]
 
@@ -115,7 +115,7 @@ fn kept_matrices_give_the_bits_of_new_ones() {
     assert!(n_unchanged > 0);
 }
 
-/// What is added up once takes no room for another time.
+/// A matrix that is assembled once reserves no memory for another time.
 #[test]
 fn a_matrix_that_never_changes_has_nothing_kept() {
     let mut problem = soil();

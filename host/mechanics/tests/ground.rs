@@ -353,7 +353,7 @@ fn a_surcharge_is_carried_down_and_at_rest() {
     }
 }
 
-/// The right half of the ground carries a surcharge: below the left half there is none of it.
+/// The right half of the ground carries a surcharge: below the left half none exists of it.
 #[test]
 fn a_surcharge_is_carried_down_its_own_vertical() {
     let analysis = Analysis::PlaneStrain;
@@ -412,7 +412,7 @@ fn level_ground_of_curved_elements_stays() {
     }
 }
 
-/// What a changed water table does to elements in which it stands is not exact, and is said so.
+/// What a changed water table does to elements in which it stands is not exact, and is reported so.
 #[test]
 fn a_water_table_inside_elements_is_announced_where_it_changes() {
     let warnings = |from: f64, to: Option<f64>| {
@@ -744,7 +744,7 @@ fn an_interface_beside_dry_pores_starts_in_balance() {
     }
 }
 
-/// Ground is taken away from a block, which then slides: there is no equilibrium, and it is said so.
+/// Ground is taken away from a block, which then slides: there is no equilibrium, and it is reported so.
 #[test]
 fn no_equilibrium_beside_ground_that_is_gone() {
     let analysis = Analysis::PlaneStrain;
@@ -876,8 +876,8 @@ fn a_stiffness_that_grows_with_depth_is_that_of_each_element() {
     }
 }
 
-/// Blocks with an interface that is not there move as one; activated, nothing moves, and its traction is
-/// the stress beside it. Without water no node is out of balance in the course of that phase.
+/// Blocks with an interface that is absent move as one; activated, nothing moves, and its traction is
+/// the stress next to it. Without water no node is out of balance in the course of that phase.
 #[test]
 fn an_interface_appears_with_the_stress_beside_it() {
     let all = [(Shape::Rectangles, true), (Shape::Cut, true)];

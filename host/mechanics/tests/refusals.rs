@@ -1,5 +1,5 @@
 //! Problems posed in memory that do not fit: each is refused with the part that does not, whatever
-//! stands in no file.
+//! is in no file.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests panic to fail")]
 
 use law::{Hypothesis, SearchPath};

@@ -1,4 +1,4 @@
-//! Simulations posed in memory: states that are gone on from twice, simulations beside each other, and
+//! Simulations posed in memory: states that are gone on from twice, simulations next to each other, and
 //! meshes that no grid has.
 #![allow(
     clippy::unwrap_used,
@@ -312,7 +312,7 @@ fn a_layer_whose_stiffness_follows_the_stress_is_gone_on_from() {
 }
 
 /// A line whose ends had sunk by different amounts when it became rigid is led to one total, as one that is not rigid is; what
-/// bends it straight is said if it is much. What counts anew keeps it as it stands.
+/// bends it straight is reported if it is much. What counts again keeps it as it stands.
 #[test]
 fn a_tilted_line_that_became_rigid_is_led_to_one_place() {
     struct Heard(Vec<String>);
@@ -465,7 +465,7 @@ fn simulations_do_not_see_each_other() {
     assert!(together[0] != together[1]);
 }
 
-/// What does not fit is said with the part that it is, not in a sentence.
+/// What does not fit is reported with the part that it is, not in a sentence.
 #[test]
 fn a_problem_that_cannot_be_is_refused_by_its_part() {
     use mechanics::problem::{Cause, Item};

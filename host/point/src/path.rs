@@ -93,7 +93,7 @@ pub struct Segment {
 }
 
 impl Segment {
-    /// A step of its own with so many increments of one unit of time, through which every component
+    /// A step of its own with this many increments of one unit of time, through which every component
     /// keeps its flux (the strain 33 in plane strain stays 0).
     pub fn new(hypothesis: Hypothesis, step: u32, increments: usize) -> Self {
         let mut control = [Control::Keep; N_MAX];

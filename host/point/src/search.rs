@@ -16,7 +16,7 @@
 //! keeps ‖r‖ falling. If it does not fall, the flux does not respond to the remaining r: on an edge,
 //! at an apex, over an open gap. Then a search along the elastic direction leaves that zone. Where this
 //! ends too, fixed-point iterations with the elastic operator go on ([`relaxation`]). What counts as the
-//! end is said in [`acceptance`].
+//! end is reported in [`acceptance`].
 
 mod acceptance;
 mod direction;

@@ -12,8 +12,8 @@ pub(crate) struct Rows<'py> {
 }
 
 impl<'py> Rows<'py> {
-    /// Takes what is an array of `n_columns`, or can be made one; a single row is one point. What is neither of
-    /// float64 nor of one piece is copied.
+    /// Takes what is an array of `n_columns`, or can be made one; a single row is one point. Arrays
+    /// that are not contiguous float64 are copied.
     ///
     /// # Errors
     /// `ValueError` that names the argument.
@@ -53,7 +53,7 @@ impl<'py> Rows<'py> {
         Ok(Self { array })
     }
 
-    /// The same, of so many rows.
+    /// The same, of this many rows.
     ///
     /// # Errors
     /// As [`Rows::of`].
@@ -78,7 +78,7 @@ impl<'py> Rows<'py> {
         array.is_c_contiguous().then(|| array.clone())
     }
 
-    /// Whether its values stand in the memory of another array.
+    /// Whether its values are in the memory of another array.
     pub(crate) fn shares_memory_with(&self, other: &Bound<'py, PyArray2<f64>>) -> bool {
         share_memory(&self.array, other)
     }
@@ -125,7 +125,7 @@ fn refuse_masked(written: &Bound<'_, PyAny>, name: &str) -> PyResult<()> {
     Ok(())
 }
 
-/// What is no array of float64 as one, row by row. Texts, dates and objects are no numbers, though NumPy makes some of
+/// Converts other objects to an array of float64, row by row. Texts, dates and objects are no numbers, though NumPy makes some of
 /// them.
 fn as_numbers<'py>(written: &Bound<'py, PyAny>, name: &str) -> PyResult<Bound<'py, PyAny>> {
     let py = written.py();
@@ -154,7 +154,7 @@ pub(crate) fn looked_at<'py>(array: &Bound<'py, PyAny>) -> PyResult<Bound<'py, P
     numpy.call_method1("asarray", (memory,))
 }
 
-/// Whether the values of two arrays stand in one memory. What is handed out of an array is no view of it for NumPy.
+/// Whether the values of two arrays are in one memory. Values handed out of an array are not a NumPy view of it.
 pub(crate) fn share_memory(a: &Bound<'_, PyArray2<f64>>, b: &Bound<'_, PyArray2<f64>>) -> bool {
     let range = |array: &Bound<'_, PyArray2<f64>>| {
         let start = array.data() as usize;

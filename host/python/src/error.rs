@@ -113,7 +113,7 @@ fn fill(to: &Bound<'_, PyDict>, error: &Error, written: Option<&str>) -> PyResul
     }
 }
 
-/// File, line and column, of what stands in no file the key; and the line itself.
+/// File, line and column, of what is in no file the key; and the line itself.
 fn place_in_file(to: &Bound<'_, PyDict>, error: &Error, written: Option<&str>) -> PyResult<()> {
     let Some(place) = error.place() else {
         return Ok(());

@@ -33,7 +33,7 @@ pub(crate) fn opener(isolate: Option<f64>) -> PyResult<Opener> {
 /// Says something that the user should know.
 ///
 /// # Errors
-/// Where warnings are errors, the warning.
+/// The warning, if warnings are errors.
 pub(crate) fn warn(py: Python<'_>, message: &str) -> PyResult<()> {
     let warn = py.import("pilum._errors")?.getattr("warn")?;
     warn.call1((message,)).map(|_| ())
@@ -41,8 +41,9 @@ pub(crate) fn warn(py: Python<'_>, message: &str) -> PyResult<()> {
 
 /// A constitutive law with its parameters fixed, for any number of points.
 ///
-/// Parameters are given by name, in the units of `pilum.describe(id)`: kPa, m, degrees. What is left out takes
-/// its default. Keys that are no parameters are those of a table of laws in a case file: `adapter`
+/// Parameters are given by name, in the units of `pilum.describe(id)`: kPa, m, degrees. Omitted
+/// parameters take their default. Keys that are no parameters are those of a table of laws in a
+/// case file: `adapter`
 /// ("umat", "mfront", "udsm", "shear_zone"), `library`, `sidecar`, `thickness`, `initial` and so on; a parameter
 /// of such a name goes into `parameters`.
 #[pyclass(frozen, module = "pilum")]
@@ -51,13 +52,13 @@ pub(crate) struct Law {
     initial: Vec<(usize, f64)>,
     table: toml::Table,
     variables: Vec<String>,
-    /// Its library is called in processes of their own.
+    /// Its library is called in separate processes.
     is_apart: bool,
     /// It was made for a hypothesis that was named.
     is_chosen: bool,
     /// Folders that it was looked for in before all others.
     folders: Vec<PathBuf>,
-    /// Seconds that a call may take in a process of its own.
+    /// Seconds that a call may take in a separate process.
     isolate: Option<f64>,
 }
 
@@ -112,8 +113,8 @@ impl Law {
         &self.built.law
     }
 
-    /// Calls the library without the interpreter's lock. Processes of its own live as long as the thread that has
-    /// started them, which may be less than the law.
+    /// Calls the library without the interpreter's lock. Worker processes live as long as the
+    /// thread that has started them, which may end before the law.
     fn calling<T: Send>(
         &self,
         py: Python<'_>,
@@ -215,7 +216,7 @@ impl Law {
         self.folders.clone()
     }
 
-    /// Seconds that a call may take in a process of its own; None if it is called in this one.
+    /// Seconds that a call may take in a separate process; None if it is called in this one.
     #[getter]
     fn isolate(&self) -> Option<f64> {
         self.isolate
@@ -480,7 +481,7 @@ impl Law {
         self.law().library().sha256()
     }
 
-    /// What it is made of again: in another process its library is looked for as here.
+    /// Data for making it again: another process searches its library as this one did.
     fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         let named = value::to_python(py, &toml::Value::Table(self.table.clone()))?;
         let named = named.cast_into::<PyDict>()?;

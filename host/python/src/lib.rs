@@ -1,8 +1,8 @@
 //! Pilum for Python: laws on arrays, drivers, runs, and simulations that are stepped.
 //!
-//! What is here turns Python's objects into what the rooms take, and back; pages, tables and meshes are
-//! Python's own (`host/python/pilum`). Whatever takes time is done without the interpreter's lock, in a
-//! thread of its own, while the thread that called listens for Ctrl-C and calls back (`task`).
+//! This crate converts between Python's objects and those of the rooms; pages, tables and meshes are
+//! Python's own (`host/python/pilum`). Whatever takes time is done without the interpreter's lock,
+//! in a separate thread, while the calling thread listens for Ctrl-C and calls back (`task`).
 #![expect(
     clippy::needless_pass_by_value,
     reason = "functions take what Python hands over"

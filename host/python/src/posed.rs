@@ -13,11 +13,11 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use text::Source;
 
-/// What is to be computed, before it is read.
+/// A case or driver before it is read.
 pub(crate) struct Posed {
     path: Option<PathBuf>,
     text: Option<String>,
-    /// What the text is called.
+    /// Name of the text.
     name: String,
     /// The mesh, as a file of Gmsh would say it.
     mesh: Option<Arc<[u8]>>,

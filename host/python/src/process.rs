@@ -1,9 +1,9 @@
-//! What belongs to the whole process, which is an interpreter and not the program.
+//! State of the whole process, which is an interpreter and not the program.
 
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
-/// Names the program that is started where work needs a process of its own, and beside which laws lie.
+/// Names the program that is started where work needs a separate process, and next to which laws lie.
 #[pyfunction]
 pub(crate) fn stands_for(program: PathBuf) {
     law::child::stands_for(program);

@@ -27,7 +27,7 @@ pub(crate) struct Simulation {
 
 struct Inner {
     simulation: mechanics::Simulation,
-    /// Of the first nodes the place in the mesh that the case names; `None` of a grid.
+    /// For the first nodes, the place in the mesh that the case names; `None` of a grid.
     kept: Option<Arc<[usize]>>,
     /// What states of it depend on, once one was taken.
     likeness: Option<Arc<Likeness>>,
@@ -278,7 +278,7 @@ impl Simulation {
         Ok(of_rows(py, nodes, 2)?.into_any())
     }
 
-    /// Of every row of `nodes` the row in the `nodes` of the mesh, of a file the place of the node there, from 0; -1 of
+    /// For every row of `nodes` the row in the `nodes` of the mesh, of a file the place of the node there, from 0; -1 of
     /// those that interfaces and divisions have made. Nodes that no element of the case has are left out of all results.
     #[getter]
     fn mesh_rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<i64>>> {
@@ -420,7 +420,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// A simulation of its own that stands where this one does.
+    /// A separate simulation in the same state.
     fn copy(&self, py: Python<'_>) -> PyResult<Self> {
         let mut inner = self.inner()?;
         let Inner {

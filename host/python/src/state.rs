@@ -27,11 +27,11 @@ pub(crate) struct State {
     pub(crate) increment: u32,
     /// Ids of the internal variables.
     pub(crate) names: Vec<String>,
-    /// What has become of its memory: see [`Memory`].
+    /// State of its memory: see [`Memory`].
     pub(crate) memory: AtomicU8,
 }
 
-/// What has become of the memory of a state.
+/// Condition of the memory of a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum Memory {
@@ -164,7 +164,7 @@ pub(crate) fn state_of(
 }
 
 impl State {
-    /// What has become of its memory.
+    /// Condition of its memory.
     pub(crate) fn memory(&self) -> Memory {
         match self.memory.load(Ordering::Relaxed) {
             0 => Memory::Own,

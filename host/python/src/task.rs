@@ -1,5 +1,5 @@
-//! Work in a thread of its own, while the thread that asked for it, without the interpreter's lock, listens:
-//! for Ctrl-C, and for what is to be said on the way.
+//! Work in its own thread, while the thread that asked for it, without the interpreter's lock, listens:
+//! for Ctrl-C, and for what is to be reported on the way.
 
 use crate::error::exception;
 use law::Stop;
@@ -18,7 +18,7 @@ const LOOK: Duration = Duration::from_millis(50);
 /// The threads that work, and the process that they belong to.
 static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
 
-/// The threads of this process: a copy of it that Python has made has none of those it was made with. Processes
+/// The threads of this process: a forked copy has none of the threads of the original. Processes
 /// that they start live as long as they do.
 ///
 /// # Errors
@@ -39,7 +39,7 @@ pub(crate) fn threads() -> PyResult<Arc<ThreadPool>> {
     Ok(threads)
 }
 
-/// What work says on the way, and how it is told to stop.
+/// Progress messages of work, and requests to stop it.
 pub(crate) struct Caller<E> {
     tell: Sender<E>,
     heard: Receiver<()>,

@@ -9,7 +9,7 @@ use toml::{Table, Value};
 /// Dictionaries and lists in one another, at most: those of files are not as deep, one that holds itself is deeper.
 const DEPTH: usize = 100;
 
-/// The keys of a dictionary. What is `None` is left out.
+/// The keys of a dictionary. Values `None` are omitted.
 ///
 /// # Errors
 /// `TypeError` with the key that has no value of a file.

@@ -2,7 +2,7 @@
 //! had never stopped.
 //!
 //! The file is written whole or not at all, and carries a checksum and the identity of its run:
-//! program, case and libraries. What the results files held at that moment is part of it.
+//! program, case and libraries. It includes the state of the results files at that moment.
 
 use crate::recorder::ResultsState;
 use law::{hexadecimal, hexadecimal_sha256};
@@ -109,7 +109,7 @@ impl<'c> Checkpoint<'c> {
         file.sync_all()
     }
 
-    /// Reads the checkpoint of a run of this identity; `None` if there is none.
+    /// Reads the checkpoint of a run of this identity; `None` if absent.
     ///
     /// # Errors
     /// It cannot be read, is damaged, or belongs to another run.

@@ -18,7 +18,7 @@ use text::write::replace;
 /// (elements without thickness), triangles and quads.
 pub(crate) const CELLS: [(usize, u8); 3] = [(3, 21), (6, 22), (8, 23)];
 
-/// VTK's number of the kind of cell with so many nodes.
+/// VTK's number of the kind of cell with this many nodes.
 fn cell_type(n_nodes: usize) -> Option<u8> {
     let (_, vtk) = CELLS.iter().find(|(n, _)| *n == n_nodes)?;
     Some(*vtk)

@@ -17,7 +17,7 @@ const SIZE: (u32, u32) = (640, 420);
 /// Margins around a plot with its labels, in points; on the right half of a number of seven digits has room.
 const MARGIN: u32 = 12;
 const MARGIN_RIGHT: u32 = 24;
-/// Room for the numbers and the name of the axis below a plot, and beside it.
+/// Room for the numbers and the name of the axis below a plot, and next to it.
 const BELOW: u32 = 38;
 const BESIDE: u32 = 58;
 /// Radius of the marker of a measured point, in points.

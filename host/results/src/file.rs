@@ -29,7 +29,7 @@ fn has_other_names(metadata: &Metadata) -> bool {
 }
 
 /// A sum by which damage is noticed: of two texts that differ in eight bytes or fewer in a row it
-/// always differs, of others but for one in 2⁶⁴. It costs next to nothing beside writing them.
+/// always differs, of others but for one in 2⁶⁴. It costs next to nothing next to writing them.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sum {
     state: u64,
@@ -174,8 +174,8 @@ impl Appended {
         }
     }
 
-    /// Appends whole entries. What fits of a text that does not fit as a whole is taken back: it
-    /// would pass for more than it is.
+    /// Appends whole entries. A text that does not fit as a whole is removed completely, so that no
+    /// part passes for the whole.
     ///
     /// # Errors
     /// [`Error::Unwritable`].

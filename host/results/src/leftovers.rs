@@ -6,7 +6,7 @@ use std::path::Path;
 use text::Error;
 
 /// Files that every run writes, or may write, under the same name. `history.csv` and `log.jsonl`
-/// are begun anew by each.
+/// are begun again by each.
 const NAMES: [&str; 11] = [
     law::capsule::FILE_NAME,
     crate::checkpoint::FILE_NAME,

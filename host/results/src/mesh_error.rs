@@ -8,23 +8,23 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct OfPhase {
     phase: String,
-    /// Of all groups that have an estimate; none if no group has one, or nothing is strained.
+    /// For all groups that have an estimate; none if no group has one, or nothing is strained.
     strains: Option<f64>,
     groups: Vec<OfGroup>,
 }
 
-/// Of one group.
+/// For one group.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct OfGroup {
     name: String,
-    /// None of an interface, of a layer, of what is not there, of a few elements.
+    /// None of an interface, of a layer, of what is absent, of a few elements.
     strains: Option<f64>,
     /// Stresses follow strains by one constant matrix.
     linear: bool,
 }
 
 impl OfPhase {
-    /// Of the state at the end of a phase.
+    /// For the state at the end of a phase.
     pub(crate) fn of(phase: &str, snapshot: &Snapshot<'_>) -> Self {
         let found = MeshError::of(snapshot);
         let groups = snapshot.groups.iter().enumerate();

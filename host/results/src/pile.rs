@@ -1,7 +1,7 @@
 //! A pile: the force in it, what holds it along its shaft and at its base, how it settles; `pile.csv`,
 //! its columns of `history.csv`, and its resistance.
 //!
-//! Everything follows from the equilibrium of the pile's elements. What acts on them from outside, node
+//! Everything follows from the equilibrium of the pile's elements. The external force on them, node
 //! by node, upward positive, is
 //!
 //! - E = ∫ Bᵀ σ' dV − ∫ Bᵀ p δ dV − W (1)
@@ -81,7 +81,7 @@ pub struct Loads {
     pub shaft: f64,
     /// What holds it at its base.
     pub base: f64,
-    /// Of the head.
+    /// For the head.
     pub settlement: f64,
     /// Its weight.
     pub weight: f64,
@@ -155,7 +155,7 @@ impl Pile {
     /// The pile within the mesh of a simulation.
     ///
     /// # Errors
-    /// What does not fit.
+    /// The mismatch.
     pub fn new(parts: Parts, simulation: &Simulation) -> Result<Self, Misfit> {
         let geometry = Geometry::new(&parts, simulation)?;
         Ok(Self { parts, geometry })
@@ -166,7 +166,7 @@ impl Pile {
         self.parts.diameter.unwrap_or(self.geometry.width)
     }
 
-    /// What it is, in words.
+    /// Its name, in words.
     pub fn description(&self, groups: &[Group]) -> String {
         let names = |numbers: &[usize]| {
             let names = numbers
@@ -235,7 +235,7 @@ impl Pile {
         (sum > 0.0).then_some(sum)
     }
 
-    /// The pile in a state; `None` if it is not there.
+    /// The pile in a state; `None` if it is absent.
     pub fn state(&self, snapshot: &Snapshot<'_>) -> Option<State> {
         let Snapshot {
             groups, problem, ..
@@ -372,7 +372,7 @@ impl Pile {
         held
     }
 
-    /// Where an interface that is not there begins at the head, its faces are one, and what the ground
+    /// Where an interface that is absent begins at the head, its faces are one, and what the ground
     /// exerts on the pile is known from the ground's own forces.
     fn take_from_ground(&self, snapshot: &Snapshot<'_>, held: &mut [Held<'_>], n_dofs: usize) {
         let head = &self.geometry.head;
@@ -459,7 +459,7 @@ impl Pile {
     }
 }
 
-/// Total stress of the pile beside a point of an interface that is not there, on its facet: normal,
+/// Total stress of the pile next to a point of an interface that is absent, on its facet: normal,
 /// tension positive, and shear, kPa.
 fn beside(snapshot: &Snapshot<'_>, facet: &Facet, point: usize) -> [f64; 2] {
     let kinematics = &snapshot.groups[facet.group].kinematics;
@@ -475,7 +475,7 @@ fn beside(snapshot: &Snapshot<'_>, facet: &Facet, point: usize) -> [f64; 2] {
     [normal, shear]
 }
 
-/// Pore pressure that an interface which is not there would have between its faces.
+/// Pore pressure that an interface which is absent would have between its faces.
 fn pressure_beside(snapshot: &Snapshot<'_>, facet: &Facet, at: [f64; 2]) -> f64 {
     let problem = snapshot.problem;
     if !problem.groups[facet.group].pore_water {

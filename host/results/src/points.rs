@@ -13,7 +13,7 @@ use text::Error;
 #[derive(Debug)]
 pub(crate) struct Points {
     pub(crate) table: Table,
-    /// What pore water has a part in, if there is any in the course of the problem.
+    /// Quantities of pore water, if the problem has any.
     pressures: &'static [Pressure],
     /// Internal variables of all laws of these groups, each once.
     variables: Vec<String>,

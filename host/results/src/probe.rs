@@ -26,7 +26,7 @@ pub enum Probe {
         group: usize,
         /// Numbers of the points within the group.
         points: Vec<usize>,
-        /// What each point stands for; empty where all count alike.
+        /// Weight of each point; empty if all count alike.
         weights: Vec<f64>,
         /// What of them.
         quantity: PointQuantity,
@@ -53,9 +53,9 @@ pub enum Probe {
         nodes: Vec<usize>,
         /// 0: x (r); 1: y (z).
         component: usize,
-        /// The group; all of them if there is none.
+        /// The group; all of them if absent.
         group: Option<usize>,
-        /// Elements of it, by number within the group; all if there are none.
+        /// Elements of it, by number within the group; all if absent.
         elements: Option<Vec<usize>>,
         /// Factor.
         scale: f64,

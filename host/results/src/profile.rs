@@ -119,7 +119,7 @@ impl Profile {
         Ok(())
     }
 
-    /// What a report shows of the table, with the table's length; what is written from here on is not in it.
+    /// Excerpt of the table for a report, with the table's length; later rows are not in it.
     pub(crate) fn shown(&mut self) -> Option<(u64, Profiles)> {
         let shown = self.shown.take()?;
         Some((self.table.length(), shown))

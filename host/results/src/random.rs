@@ -5,7 +5,7 @@
 pub struct Random(u64);
 
 impl Random {
-    /// Numbers of their own for each dimension: one more dimension leaves those of the others alone.
+    /// their own Numbers for each dimension: one more dimension leaves those of the others alone.
     pub fn of(seed: u64, dimension: usize) -> Self {
         let mut seeds = Self(seed);
         for _ in 0..dimension {

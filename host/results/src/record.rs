@@ -8,7 +8,7 @@ use text::{Source, base, key};
 /// A setting of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RunSetting {
-    /// What it is of, in words.
+    /// Its subject, in words.
     pub(crate) section: String,
     /// Its name there.
     pub(crate) name: String,
@@ -20,7 +20,7 @@ pub(crate) struct RunSetting {
     pub(crate) unit: String,
 }
 
-/// What a run was computed with, whether its file says so or not: defaults too.
+/// What a run was computed with, whether its file reports it or not: defaults too.
 pub(crate) fn settings(summary: &Value) -> Vec<RunSetting> {
     let mut settings = Settings(Vec::new());
     settings.add("program", "version", None, &summary["program"]);
@@ -124,7 +124,7 @@ impl Settings {
     }
 }
 
-/// What the files of a run say, with its variant and the settings of its command line, by dotted
+/// Content of the files of a run, with its variant and the settings of its command line, by dotted
 /// path; nothing, where the record does not have them.
 pub(crate) fn settings_of_files(summary: &Value) -> Vec<(String, Value)> {
     let mut source: Option<Source> = None;
@@ -176,7 +176,7 @@ fn flatten(path: String, value: Value, found: &mut Vec<(String, Value)>) {
     }
 }
 
-/// What runs are called by their folders: as much of the path as tells them apart.
+/// Names of runs from their folders: as much of the path as distinguishes them.
 pub(crate) fn names(folders: &[PathBuf]) -> Vec<String> {
     let last = |folder: &PathBuf| {
         let path = std::path::absolute(folder).ok()?;
@@ -200,7 +200,7 @@ pub(crate) fn names(folders: &[PathBuf]) -> Vec<String> {
     names
 }
 
-/// A text, empty if there is none.
+/// A text, empty if absent.
 pub(crate) fn text(value: &Value) -> &str {
     value.as_str().unwrap_or_default()
 }

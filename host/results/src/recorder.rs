@@ -1,7 +1,7 @@
 //! Results in a folder: `history.csv`, `profile.csv`, `pile.csv`, `points.csv`, `fields.pvd` with `*.vtu`,
 //! `summary.json`, `log.jsonl`. Rows are flushed as increments converge, so whatever was reported
-//! is in its file. What an earlier run left in the folder is removed first, unless it is resumed:
-//! then the files go on from where its last checkpoint saw them.
+//! is in its file. Files of an earlier run are removed first. A resumed run continues them from its
+//! last checkpoint.
 
 use crate::fields::{self, Fields, Written};
 use crate::figure::{Curve, Figures};
@@ -107,12 +107,12 @@ fn empty_figures(wanted: &Wanted) -> Figures {
     Figures::new(&wanted.title, &wanted.figures, names)
 }
 
-/// What stands in a cell of a table.
+/// Content of a table cell.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Cell<'a> {
     Text(&'a str),
     Count(usize),
-    /// Empty where there is none.
+    /// Empty where absent.
     Number(Option<f64>),
     /// Some cells as a row has them.
     Written(&'a [u8]),
@@ -725,7 +725,7 @@ impl From<Error> for Fault {
 }
 
 /// Removes what an earlier run left in a folder, for work that comes before the next one begins there: if
-/// that fails, nothing stands there as its result.
+/// that fails, nothing is there as its result.
 ///
 /// # Errors
 /// [`Error::Unwritable`]; another run writes there.

@@ -1,11 +1,11 @@
 //! `report.html`: the results of a run, or of several side by side, as one file that opens without
 //! a network.
 //!
-//! What needs no drawing is written as tables by the template; what does goes into the page as
-//! JSON, rounded to seven digits, and is drawn by the page's own script. The CSV files stay the
+//! The template writes tables. Drawings go into the page as JSON, rounded to seven digits, and is
+//! drawn by the page's own script. The CSV files stay the
 //! primary result and are linked. However long they are, and however many runs there are, the page
-//! stays of a size that a browser opens; what is left out for that is said. A folder only has to have a `history.csv`; whatever else is
-//! missing or broken is left out, and the page says so.
+//! stays of a size that a browser opens; what is left out for that is reported. A folder only has to have a `history.csv`; whatever else is
+//! missing or broken is left out, and the page reports it.
 
 mod budget;
 mod comparison;
@@ -37,8 +37,8 @@ use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 /// Name of a report's file.
 const FILE: &str = "report.html";
 
-/// Where the report of these folders is written if nothing else is asked for: into the folder
-/// itself, or beside the first of several.
+/// Default place of the report of these folders: into the folder
+/// itself, or next to the first of several.
 pub fn default_path(folders: &[PathBuf]) -> PathBuf {
     match folders {
         [folder] => folder.join(FILE),
@@ -57,7 +57,7 @@ pub struct Known {
     pub(crate) profile: Option<(u64, Profiles)>,
 }
 
-/// The report of a run, or of a study, that is under way: written anew at most once a second, and so seldom
+/// The report of a run, or of a study, that is under way: written again at most once a second, and so seldom
 /// that it takes about a hundredth of the time; marked, and reloading itself.
 #[derive(Debug)]
 pub struct Running {
@@ -65,7 +65,7 @@ pub struct Running {
     next: Instant,
 }
 
-/// Least time between two of them, and what is under way for less has none.
+/// Least time between two of them; a shorter run has no interim report.
 const EVERY: Duration = Duration::from_secs(1);
 /// So many times as long as writing one takes, none is written.
 const SELDOM: u32 = 100;
@@ -105,7 +105,7 @@ impl Running {
     }
 }
 
-/// Whether a folder holds what a run has written, which a dry run leaves as it is.
+/// Whether a folder holds what a run has written, which a dry run leaves unchanged.
 fn has_results(folder: &Path) -> bool {
     let written = ["summary.json", "history.csv", crate::checkpoint::FILE_NAME];
     written.iter().any(|name| folder.join(name).is_file())

@@ -1,6 +1,5 @@
 //! A table of runs, one row each: how they ended, the settings in which they differ, and the last
-//! values of their probes. Of a study: its parameters, what counts of its results, and every run that it
-//! has.
+//! values of their probes. For a study: its parameters, its outputs, and every run.
 
 use crate::record::{entries, names, settings, settings_of_files, text};
 use crate::study::{self, History, State};
@@ -12,7 +11,7 @@ use text::{Error, Source};
 
 /// The file that makes a folder one of results.
 const SUMMARY: &str = "summary.json";
-/// What the record of a pile may have, `pile.` before it in the table.
+/// Values that the record of a pile may have, `pile.` before it in the table.
 const RESISTANCES: [&str; 3] = [
     "resistance_10_percent_diameter",
     "resistance_davisson",
@@ -58,8 +57,8 @@ pub fn of(folders: &[PathBuf]) -> Result<String, Error> {
         .map_err(|error| Error::Internal(format!("the table of runs: {error}")))
 }
 
-/// The table of a study: all of its runs, whatever became of them, with their parameters, what counts of
-/// their results, and why one has none.
+/// The table of a study: all runs, whatever their outcome, with parameters, outputs, and the reason
+/// of a missing output.
 fn of_study(folder: &Path) -> Result<String, Error> {
     let record = study::Record::read(folder)?;
     let rows = record.runs(folder)?;
@@ -262,7 +261,7 @@ fn written(names: &[String], runs: &[Run]) -> Result<String, Box<dyn std::error:
     Ok(String::from_utf8(table.into_inner()?)?)
 }
 
-/// A value in a cell; nothing, where there is none. A number has all its digits.
+/// A value in a cell; nothing, where absent. A number has all its digits.
 pub(crate) fn shown(value: &Value) -> String {
     match value {
         Value::Null => String::new(),
@@ -349,7 +348,7 @@ mod tests {
         assert_eq!(shown(&json!([1, 2])), "[1,2]");
     }
 
-    /// What one file leaves out and the other gives differs; a law that one run lacks is no column.
+    /// A key that only one file gives counts as different; a law that one run lacks is no column.
     #[test]
     fn what_a_law_is_made_and_started_with_differs() {
         let with = |zone: Value, initial: Value| {

@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 use text::Error;
 use text::write::replace_whole;
 
-/// What a study is, in its folder.
+/// Definition of a study, in its folder.
 pub const RECORD: &str = "study.json";
 /// Its runs.
 pub const TABLE: &str = "runs.csv";
@@ -36,7 +36,7 @@ const LOCK: &str = ".lock";
 const FIRST: [&str; 2] = ["index", "folder"];
 const LAST: [&str; 2] = ["state", "reason"];
 
-/// What a study is.
+/// Definition of a study.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Record {
     /// The program.
@@ -274,7 +274,7 @@ pub fn identity_of_run(folder: &Path) -> Option<String> {
     read_run(folder).map(|record| record.identity)
 }
 
-/// Forgets how far a run has come; its results stay until it begins anew.
+/// Forgets how far a run has come; its results stay until it begins again.
 ///
 /// # Errors
 /// [`Error::Unwritable`].
@@ -338,7 +338,7 @@ pub struct Row {
     pub folder: String,
     /// Values of the parameters: texts without quotes, all else as the case file has it.
     pub values: Vec<String>,
-    /// What counts of its results, by output; `None` as long as there is none.
+    /// What counts of its results, by output; `None` as long as none exists.
     pub numbers: Vec<Option<f64>>,
     /// How far it has come.
     pub standing: Standing,
@@ -350,8 +350,8 @@ pub fn is_study(folder: &Path) -> bool {
 }
 
 impl Record {
-    /// The first of these files that was another one when the study was planned, by its name. One that was not
-    /// there then is none.
+    /// The first of these files that was another one when the study was planned, by its name. A
+    /// file that did not exist then does not count.
     pub fn changed(&self, files: impl Iterator<Item = (String, String)>) -> Option<String> {
         let is_other = |(name, sum): &(String, String)| {
             let planned = self.files.get(name);

@@ -16,14 +16,14 @@ use std::time::Duration;
 /// Name of a group's own law, and phases with the laws that they give it.
 pub type LawsOfGroup = (String, Vec<(String, String)>);
 
-/// What the record says of a run beside what the simulation knows.
+/// What the record says of a run next to what the simulation knows.
 #[derive(Clone, Debug, Default)]
 pub struct About {
     /// Name of the case.
     pub case: String,
     /// Name of the variant, if it is one.
     pub variant: Option<String>,
-    /// What the case is.
+    /// Title of the case.
     pub title: String,
     /// SHA-256 of the text of its files.
     pub sha256: String,
@@ -33,7 +33,7 @@ pub struct About {
     pub settings: Vec<String>,
     /// Path and SHA-256 of the file of the mesh, if it has one.
     pub mesh_file: Option<(String, String)>,
-    /// Of every group the name of its law, and those of the laws that phases give it, by phase.
+    /// For every group the name of its law, and those of the laws that phases give it, by phase.
     pub laws_of_groups: Vec<LawsOfGroup>,
     /// All laws used, by name and hypothesis.
     pub laws: IndexMap<(String, &'static str), Arc<BuiltLaw>>,
@@ -65,7 +65,7 @@ impl Ending {
     }
 }
 
-/// What is known of a run so far.
+/// State of a run so far.
 #[derive(Debug)]
 pub(crate) struct Summary {
     head: Map<String, Value>,
@@ -84,7 +84,7 @@ pub(crate) struct Stopped {
     pub(crate) probes: Vec<Option<f64>>,
 }
 
-/// What has happened so far.
+/// Events so far.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Course {
     /// Phases, with the values of the probes after their last increments.
@@ -179,7 +179,7 @@ impl Summary {
         }
     }
 
-    /// What is known before the first increment.
+    /// Data known before the first increment.
     pub(crate) fn running(&self) -> Value {
         let mut summary = self.head.clone();
         summary.insert("status".to_owned(), json!("running"));

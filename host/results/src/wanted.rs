@@ -1,4 +1,4 @@
-//! What results a run is to write, as plain values.
+//! Requested results of a run, as plain values.
 
 use crate::pile::{self, Pile};
 use crate::probe::Probes;
@@ -14,7 +14,7 @@ pub struct Wanted {
     pub probes: Probes,
     /// A pile whose forces are written for every increment.
     pub pile: Option<Pile>,
-    /// Title of figures that have none of their own.
+    /// Title of figures without a title.
     pub title: String,
     /// Curves that are drawn.
     pub figures: Vec<Figure>,
@@ -51,7 +51,7 @@ pub struct Figure {
     /// The integration points of a cut instead of columns.
     pub points: Option<Cut>,
     /// The stations of the pile instead of columns, from the head down, after these increments of the
-    /// phase, a curve for each; after the last one if there is none.
+    /// phase, a curve for each; after the last one if absent.
     pub along_pile: Option<Vec<usize>>,
     /// Measured points, drawn as markers.
     pub measured: Vec<Measured>,
@@ -71,21 +71,21 @@ pub struct Measured {
     pub label: String,
     /// Points in the order of their file.
     pub points: Vec<(f64, f64)>,
-    /// The curve, from 0, that they are measured values of: they have its colour, and no entry in the
-    /// legend of their own.
+    /// The curve, from 0, that they are measured values of: they have its colour and no separate
+    /// entry in the legend.
     pub of_curve: Option<usize>,
 }
 
 /// Integration points inside extents (ends excluded), at chosen increments.
 #[derive(Clone, Debug, Default)]
 pub struct Cut {
-    /// Of this group; of all if left out.
+    /// Group; by default all.
     pub group: Option<String>,
     /// Extent in x (r).
     pub x: Option<[f64; 2]>,
     /// Extent in y (z).
     pub y: Option<[f64; 2]>,
-    /// After these increments of the phase, a curve for each; after the last one if there is none.
+    /// After these increments of the phase, a curve for each; after the last one if absent.
     pub increments: Vec<usize>,
     /// Factor of what stands along the vertical axis.
     pub scale: f64,
@@ -111,7 +111,7 @@ pub enum Reduce {
     Sum,
 }
 
-/// What is written.
+/// Output.
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "OutputInput")]

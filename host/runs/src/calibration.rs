@@ -46,7 +46,7 @@ use model::{Model, Subject};
 use propagation::Errors;
 use std::path::{Path, PathBuf};
 
-/// What is asked of a calibration.
+/// Settings of a calibration.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Only this variant.
@@ -57,16 +57,16 @@ pub struct Options {
     pub out: Option<PathBuf>,
     /// Who may want it to stop.
     pub stop: Stop,
-    /// What libraries of laws are opened with.
+    /// Settings for opening libraries of laws.
     pub opener: Opener,
-    /// What an earlier call that was ended has computed is forgotten.
+    /// Forgets the results of an earlier call that was ended.
     pub anew: bool,
 }
 
-/// What a calibration has found.
+/// Result of a calibration.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// Title.
     pub title: String,
@@ -74,13 +74,13 @@ pub struct Outcome {
     pub parameters: Vec<Parameter>,
     /// Their values.
     pub values: Vec<f64>,
-    /// Of each, the last stage that it was fitted in, and its place there.
+    /// For each, the last stage that fitted it, and its place there.
     pub places: Vec<(usize, usize)>,
     /// Stages in order.
     pub stages: Vec<Stage>,
     /// Tests in the order of the file.
     pub tests: Vec<Fitted>,
-    /// What is to be said of them.
+    /// Notes about them.
     pub words: Vec<String>,
     /// So many of these, the first, are why values and intervals are not to be believed.
     pub warnings: usize,
@@ -97,7 +97,7 @@ pub struct Outcome {
 /// An interval of confidence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
-    /// Its ends; `None` where there is none, or none is known.
+    /// Its ends; `None` where absent, or none is known.
     pub ends: [Option<f64>; 2],
     /// What becomes of an end that is `None`.
     pub open: [Open; 2],
@@ -105,7 +105,7 @@ pub struct Interval {
     pub is_of_profile: bool,
 }
 
-/// What is beyond a side of an interval.
+/// State beyond a side of an interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Open {
     /// It has an end.

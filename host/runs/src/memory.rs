@@ -1,9 +1,9 @@
-//! What happens when memory runs out: a message that says how much is needed, a summary that says so
+//! Handling of exhausted memory: a message that says how much is needed, a summary that reports it
 //! too, and exit code 1. Rows that were written stay.
 //!
 //! An allocation that fails cannot be reported by the code that asked for it: it has no other way
 //! on. So the program's allocator gives back a reserve, says what there is to say, and ends the
-//! process. What is worked on says beforehand how much it will take.
+//! process. Large pieces of work announce the memory they need.
 
 use crate::Error;
 use rustix::io::Errno;
@@ -25,7 +25,7 @@ const LARGEST_KEPT: usize = (32 << 20) - (1 << 16);
 /// Exit code: the limit is the user's to raise.
 const CODE: u8 = 1;
 
-/// What the last words are said in.
+/// Buffer for the last message.
 static HELD: Mutex<[Vec<u8>; N_PIECES]> = Mutex::new([const { Vec::new() }; N_PIECES]);
 /// Bytes that what goes on was expected to take in all.
 static EXPECTED: AtomicU64 = AtomicU64::new(0);
@@ -41,7 +41,7 @@ thread_local! {
     static IS_LAST: Cell<bool> = const { Cell::new(false) };
 }
 
-/// The program's allocator: the system's, with an end that is said.
+/// The program's allocator: the system's, with an end that is reported.
 #[derive(Debug)]
 pub struct Allocator;
 
@@ -85,7 +85,7 @@ unsafe impl GlobalAlloc for Allocator {
     }
 }
 
-/// Sets aside what the last words are said in, and lets freed memory be used again.
+/// Sets aside what the last words are reported in, and lets freed memory be used again.
 pub fn reserve() {
     // Before freed memory is kept, so that giving it back gives it to whichever thread needs it.
     if let Ok(mut held) = HELD.lock() {
@@ -109,7 +109,7 @@ fn keep_freed() {
     }
 }
 
-/// What comes next, and how many bytes it takes beside what is in use.
+/// What comes next, and how many bytes it takes next to what is in use.
 pub(crate) fn expect(bytes: u64, what: &'static str) {
     EXPECTED.store(in_use().unwrap_or(0) + bytes, Ordering::Relaxed);
     if let Ok(mut doing) = DOING.lock() {

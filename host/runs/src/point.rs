@@ -41,7 +41,7 @@ pub struct PointReport {
     pub last: Vec<(String, f64)>,
     /// What the user should know.
     pub warnings: Vec<String>,
-    /// Where the rows are, unless they went to the standard output.
+    /// File of the rows, unless they went to the standard output.
     pub csv: Option<PathBuf>,
 }
 
@@ -108,7 +108,7 @@ pub fn run_file(path: &Path, csv: Option<&Path>) -> Result<PointReport, Error> {
 
 /// Runs a driver file: all its variants one after the other, or one of them. Rows go to `csv`, or
 /// to the standard output; of several variants to `csv` with `_<variant>` before its ending.
-/// Figures stand beside `csv`, each with the curves of all variants.
+/// Figures are next to `csv`, each with the curves of all variants.
 ///
 /// # Errors
 /// Bad input and trouble with libraries, before anything is written; what cannot be written; a
@@ -325,7 +325,7 @@ impl Write for Guarded {
 }
 
 /// Follows a driver and writes its rows as comma-separated values; `name` is for messages, and a
-/// capsule is written beside it if it is a file.
+/// capsule is written next to it if it is a file.
 ///
 /// # Errors
 /// As [`run_file_until`]; the rows found until then have been written.
@@ -397,8 +397,8 @@ fn follow(
     }
 }
 
-/// Writes the call of the law behind an error beside a table that is a file, and says so. A table on
-/// the standard output has no place beside it.
+/// Writes the call of the law behind an error next to a table that is a file, and reports it. A table on
+/// the standard output has no place next to it.
 fn with_capsule(driver: &Driver, error: point::Error, name: &Path) -> Result<point::Error, Error> {
     let capsule = error.failed_call().and_then(|(failure, call)| {
         let mut origin = vec![("driver", driver.path().display().to_string().into())];

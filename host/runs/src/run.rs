@@ -30,7 +30,7 @@ pub trait Observer {
     fn cut_back(&mut self, place: &Place, reason: &str);
     /// Something the user should know.
     fn warning(&mut self, message: &str);
-    /// What is being done before the first phase.
+    /// Activity before the first phase.
     fn note(&mut self, _message: &str) {}
     /// The ground was found at rest in this phase but for a share of its weight, which the phase
     /// carries to equilibrium.
@@ -41,8 +41,7 @@ pub trait Observer {
     fn written(&mut self, _known: report::Known) {}
     /// The run has ended; this is the resistance of its pile.
     fn pile(&mut self, _resistances: &Resistances) {}
-    /// Who may want the run to stop: after the increment under way, or within it if that takes
-    /// long.
+    /// A request to stop: after the current increment, or within it if that takes long.
     fn stop(&self) -> Stop {
         Stop::never()
     }
@@ -53,9 +52,9 @@ pub trait Observer {
 pub struct Options {
     /// Go on from the checkpoint in the folder, if there is one.
     pub resume: bool,
-    /// Time between checkpoints; `None`: there are none.
+    /// Time between checkpoints; `None`: none exist.
     pub checkpoints: Option<Duration>,
-    /// A run that has come to its end leaves no checkpoint that says so.
+    /// A run that has come to its end leaves no checkpoint that reports it.
     pub ends_without: bool,
     /// A report is written while the run goes on, if that takes more than a second, and one at its end by this
     /// process.
@@ -139,7 +138,7 @@ fn was_said(warning: &Warning) -> bool {
     matches!(warning, Warning::NoTime { .. })
 }
 
-/// What is to be said of a case before its first phase.
+/// Warnings about a case before its first phase.
 fn all_warnings(
     case: &Case,
     laws: &Laws,
@@ -497,7 +496,7 @@ impl Watch for Follower<'_> {
     }
 }
 
-/// After a checkpoint a run goes on for so many times what it took: a large state is not written over and over.
+/// After a checkpoint a run goes on for this many times what it took: a large state is not written over and over.
 /// Not where one is wanted after every increment.
 const AT_LEAST: u32 = 20;
 
@@ -506,7 +505,7 @@ struct Keeper {
     identity: String,
     folder: PathBuf,
     every: Option<Duration>,
-    /// There is none at the end.
+    /// It is absent at the end.
     ends_without: bool,
     last: Instant,
     /// How long the last one took.
@@ -526,7 +525,7 @@ impl Keeper {
         }
     }
 
-    /// What the folder's checkpoint holds, if there is one.
+    /// Content of the folder's checkpoint, if it exists.
     fn found(&self) -> Result<Option<Checkpoint<'static>>, text::Error> {
         Checkpoint::read(&self.folder, &self.identity)
     }
@@ -672,8 +671,7 @@ fn keep_capsule(
     )))
 }
 
-/// Where to look if a law of the user's own may have kept the iterations from converging: a
-/// wrong tangent does that.
+/// Hint if a user's law may have prevented convergence: a wrong tangent does that.
 fn suspicion(simulation: &Simulation, error: &mechanics::Error) -> Option<String> {
     let mechanics::Error::NoEquilibrium(none) = error else {
         return None;

@@ -1,9 +1,9 @@
 //! Many runs of one case: `pilum study`.
 //!
 //! A [`Plan`] is the study with the values of all its runs. [`Plan::prepare`] checks it and writes the
-//! table of runs; [`carry_out`] starts a process for each run, so many at a time; [`run_one`] is what
-//! such a process does, or one that whatever else distributes work has started. What was done stands in
-//! the folders of the runs, so that any of these processes may be killed at any time.
+//! table of runs; [`carry_out`] starts a process for each run, this many at a time; [`run_one`] is what
+//! such a process does, or one that whatever else distributes work has started. The folders of the
+//! runs hold all results, so that any of these processes may be killed at any time.
 
 mod carry_out;
 mod design;
@@ -36,7 +36,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Of a study file; results go to `out`, or to `results/<study>`.
+    /// A study file; results go to `out`, or to `results/<study>`.
     ///
     /// # Errors
     /// Bad input, at its place in the file.
@@ -64,7 +64,7 @@ impl Plan {
         &self.folder
     }
 
-    /// What should be known of the plan before it is carried out.
+    /// Warnings about the plan before it is carried out.
     pub fn warnings(&self) -> Vec<String> {
         let (n, what) = match self.study.file.method {
             Method::Sobol => (self.rows.len(), "runs"),
@@ -104,7 +104,7 @@ impl Plan {
         Ok(case)
     }
 
-    /// What the texts of study and case are, with the program.
+    /// Texts of study and case, with the program version.
     fn texts(&self, case: &Case) -> String {
         let parts = [
             env!("CARGO_PKG_VERSION"),
@@ -212,7 +212,7 @@ impl Plan {
     }
 
     /// Writes the record of the study, which [`Plan::check`] returned, and the table of its runs; whoever
-    /// calls holds the table. What was done of them in earlier calls is kept, unless they are to be carried
+    /// calls holds the table. Results of earlier calls are kept, unless they are to be carried
     /// out `anew`.
     ///
     /// # Errors
@@ -227,7 +227,7 @@ impl Plan {
         self.prepare_beside(record, None)
     }
 
-    /// The same with what was done of the runs, but for one that is begun anew.
+    /// The same with what was done of the runs, but for one that is begun again.
     fn prepare_beside(&self, record: &Record, anew: Option<usize>) -> Result<Vec<Row>, Error> {
         let is_same = is_study(&self.folder)
             && Record::read(&self.folder).is_ok_and(|old| old.identity == record.identity);
@@ -278,7 +278,7 @@ impl Plan {
     }
 }
 
-/// What is said of a folder with another run.
+/// Error of a folder with another run.
 fn other_run(folder: &Path) -> Error {
     Error::usage(format!(
         "{}: it holds a run of another case, with other values, libraries or another version of the program: \
@@ -287,7 +287,7 @@ fn other_run(folder: &Path) -> Error {
     ))
 }
 
-/// What is said where the runs of one study would be of two libraries, or of two meshes.
+/// Error if the runs of one study would use two libraries, or two meshes.
 fn other_file(folder: &Path, name: &str) -> Error {
     Error::usage(format!(
         "{}: {name} is another one than the runs of this study were planned with: --out names another folder, --anew \

@@ -1,8 +1,8 @@
 //! A law may end the process that calls it, in many ways: `exit`, a crash, a copy by `fork`. So the
 //! program is carried out by a child, a copy of itself made before it has any thread, and watches. What
-//! the child calls, what it has handed out and how it means to end stands in memory that both share; a
+//! the child calls, what it has handed out and how it means to end is in memory that both share; a
 //! child that is gone without having said how it ends was ended by a law. Then the same is done once
-//! more with laws in processes of their own ([`law::isolate`]), which names the point.
+//! more with laws in separate processes ([`law::isolate`]), which names the point.
 //!
 //! The watcher takes the signals; the child and its children are not reached by those of the
 //! terminal, and see a request to stop in the memory. One that does not answer is ended.
@@ -34,7 +34,7 @@ use law::{SharedMemory, calls};
 
 /// Set to anything, the program does all in one process, for debuggers and profilers.
 pub const ALONE: &str = "PILUM_UNSUPERVISED";
-/// What is said to whoever asks the program to stop.
+/// Message after a request to stop.
 pub const STOPPING: &str = "stopping after this increment; once more to stop at once";
 
 #[cfg(target_os = "linux")]
@@ -52,7 +52,7 @@ mod word {
     pub(super) const CASES: usize = 4;
     /// 1: in the course of the phases of a case.
     pub(super) const RUNNING: usize = 5;
-    /// 1: all is done once more, with laws in processes of their own.
+    /// 1: all is done once more, with laws in separate processes.
     pub(super) const AGAIN: usize = 6;
     /// Then: cases that had begun the first time.
     pub(super) const BEGUN: usize = 7;
@@ -60,7 +60,7 @@ mod word {
     pub(super) const ENOUGH: usize = 8;
     /// Then: bytes that had been handed out.
     pub(super) const SKIP: usize = 9;
-    /// 1: laws are in processes of their own anyway.
+    /// 1: laws are in separate processes anyway.
     pub(super) const APART: usize = 10;
 }
 #[cfg(target_os = "linux")]

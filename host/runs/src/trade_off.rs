@@ -1,4 +1,4 @@
-//! What accuracy costs: `pilum trade-off`.
+//! Cost of accuracy: `pilum trade-off`.
 //!
 //! A study runs a driver or a case under many settings and measures each against a reference that
 //! is finer than all of them and says how far it is converged. [`run`] is the command;
@@ -36,7 +36,7 @@ use std::path::{Path, PathBuf};
 use text::write::replace;
 use trial::Scratch;
 
-/// What is asked of a study.
+/// Settings of a study.
 #[derive(Clone, Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "options of the command line")]
 pub struct Options {
@@ -58,7 +58,7 @@ pub struct Options {
     pub interface_stiffness: bool,
     /// Who may want the study to stop.
     pub stop: Stop,
-    /// What libraries of laws are opened with.
+    /// Settings for opening libraries of laws.
     pub opener: Opener,
 }
 
@@ -178,7 +178,7 @@ fn run_cases(
 }
 
 impl Options {
-    /// What a study is called: the file, the variant and the settings.
+    /// Name of a study: the file, the variant and the settings.
     fn full_name(&self, name: &str, variant: Option<&str>) -> String {
         let settings = self.settings.iter().map(String::as_str);
         let parts = std::iter::once(name).chain(variant).chain(settings);

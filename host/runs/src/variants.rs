@@ -1,4 +1,4 @@
-//! Which of several variants are meant: of cases and of drivers alike.
+//! Selection among variants, for cases and drivers.
 
 use crate::Error;
 use text::suggestion;

@@ -106,7 +106,7 @@ pub(super) fn run_cases(
 }
 
 /// Reads, builds and checks a case, or all variants of one, and writes the report of each; nothing is
-/// computed. What is wrong with one does not hide what is wrong with the others.
+/// computed. An error in one variant does not hide errors in the others.
 pub(super) fn dry_run_cases(
     opener: &Opener,
     (path, settings): (&Path, &[String]),

@@ -14,7 +14,7 @@ use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// What of a study is asked for.
+/// Requested part of a study.
 pub(super) enum What {
     /// The table of runs alone.
     Plan,
@@ -83,7 +83,7 @@ fn processors() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// What the process of each run is told.
+/// Arguments of the process of each run.
 fn arguments(opener: &Opener, how: &How) -> Vec<std::ffi::OsString> {
     let trust = opener.trust();
     let mut arguments = vec![format!("--checkpoint={}", how.checkpoint)];
@@ -96,7 +96,7 @@ fn arguments(opener: &Opener, how: &How) -> Vec<std::ffi::OsString> {
     arguments.into_iter().map(Into::into).collect()
 }
 
-/// Of one run among many only what should be known is said.
+/// One run among many reports only warnings.
 struct Quiet(Stop);
 
 impl Observer for Quiet {

@@ -53,7 +53,7 @@ use text::write::replace;
     reason = "switches of the command line"
 )]
 pub struct Arguments {
-    /// A library, of the contract or of a UMAT with a sidecar beside it, with `--driver` of a UDSM or of MFront
+    /// A library, of the contract or of a UMAT with a sidecar next to it, with `--driver` of a UDSM or of MFront
     /// behaviours too; or the id of a law that is found as `pilum laws` finds it.
     #[arg(required_unless_present = "list")]
     library: Option<String>,
@@ -73,7 +73,7 @@ pub struct Arguments {
     /// place of random ones.
     #[arg(long, value_name = "FILE", conflicts_with = "set")]
     driver: Option<PathBuf>,
-    /// Where the calls behind failures and warnings are written, for `pilum replay`; default:
+    /// Folder for the calls behind failures and warnings, for `pilum replay`; default:
     /// `results/check/<library>`.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -93,7 +93,7 @@ pub struct Arguments {
     /// hangs takes the program with it, and there are no limits of time and memory.
     #[arg(long)]
     in_process: bool,
-    /// Run the one check as a child; its answer is the last line, or beside the file of its calls.
+    /// Run the one check as a child; its answer is the last line, or next to the file of its calls.
     #[arg(long, hide = true, requires = "only", conflicts_with = "in_process")]
     child: bool,
     /// Lead a routine a short way only.
@@ -105,7 +105,7 @@ pub struct Arguments {
     /// Write every call of the child to this file before it is made.
     #[arg(long, hide = true, requires = "child")]
     kept: Option<PathBuf>,
-    /// Make the call in this file a capsule beside it.
+    /// Make the call in this file a capsule next to it.
     #[arg(long, hide = true, requires = "child", conflicts_with = "kept")]
     tell: Option<PathBuf>,
 }
@@ -128,7 +128,7 @@ fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
-/// What a check is about.
+/// Subject of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Family {
@@ -171,7 +171,7 @@ fn checks() -> impl Iterator<Item = &'static Check> {
     .flatten()
 }
 
-/// What a check found out, if it has not passed.
+/// Finding of a check that has not passed.
 #[derive(Clone, Debug)]
 enum Verdict {
     Skipped(String),
@@ -269,7 +269,7 @@ impl From<std::io::Error> for Verdict {
     }
 }
 
-/// What is checked.
+/// Subject of the checks.
 #[derive(Debug)]
 struct Subject {
     path: PathBuf,
@@ -303,8 +303,8 @@ impl Subject {
         file::read_library(&self.path).map_err(|why| failed(format!("it cannot be read: {why}")))
     }
 
-    /// The library as a file would name it, called in this process, if it keeps no contract: that of a check
-    /// is one of its own.
+    /// The library as a file would name it, called in this process if it has no contract; a check
+    /// has a separate process.
     fn foreign(&self) -> Option<Foreign> {
         if let Some(capsule) = &self.at {
             return capsule.law.foreign();
@@ -490,7 +490,7 @@ fn judged(arguments: &Arguments, path: &Path, findings: &[Finding]) -> Result<()
     )))
 }
 
-/// Children work in folders of their own.
+/// Children work in their own folders.
 fn with_absolute_driver(arguments: &Arguments) -> Result<Arguments, Error> {
     let mut own = arguments.clone();
     if let Some(driver) = &arguments.driver {
@@ -505,7 +505,7 @@ fn with_absolute_driver(arguments: &Arguments) -> Result<Arguments, Error> {
     Ok(own)
 }
 
-/// The library's file: a path as it is, a law's id where `pilum laws` finds it. Nothing is opened.
+/// The library's file: a path unchanged, a law's id where `pilum laws` finds it. Nothing is opened.
 fn library_path(name: &str) -> Result<PathBuf, Error> {
     let path = Path::new(name);
     let looks_like_a_path = path.components().count() > 1 || name.ends_with(DLL_SUFFIX);
@@ -690,7 +690,7 @@ fn run_here(arguments: &Arguments, path: &Path, is_routine: bool) -> Result<Vec<
         .collect())
 }
 
-/// What starts the line with a child's answer, where it is printed.
+/// Prefix of the line with a child's answer.
 const ANSWER: &str = "pilum-check-answer ";
 /// The ending of the file with it, else.
 const ANSWERED: &str = "answer";
@@ -714,7 +714,7 @@ struct Answer {
     is_late: bool,
 }
 
-/// Where what is in a capsule comes from, by key.
+/// Origin of the content of a capsule, by key.
 fn origin(check: &Check, seed: u64) -> [(&'static str, toml::Value); 2] {
     [
         ("check", check.id.into()),
@@ -813,8 +813,9 @@ fn own_arguments(check: &Check, arguments: &Arguments) -> Vec<OsString> {
     own
 }
 
-/// Runs one check in a child. A routine may end its process where it does not converge, far away: then what
-/// it does on short paths is told too. That it does so is a fault of one check, and a warning of the others.
+/// Runs one check in a child. A routine may end its process on long paths where it does not
+/// converge; its results on short paths are then reported too. That it does so is a fault of one
+/// check, and a warning of the others.
 fn in_child(
     check: &Check,
     arguments: &Arguments,

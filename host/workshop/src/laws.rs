@@ -42,7 +42,7 @@ fn json(value: &impl Serialize) -> Result<String, Error> {
 }
 
 /// One line for every law found, and the conventions of every route by which laws come in; a
-/// library that claims a law and cannot be used is said to be so.
+/// library that claims a law and cannot be used is reported to be so.
 pub fn list(search: &SearchPath) -> String {
     let mut text = String::new();
     for (library, read) in sidecars(search) {
@@ -160,7 +160,7 @@ fn sidecars(search: &SearchPath) -> Vec<(PathBuf, Result<LawDescription, law::Er
 /// The law of a name: an id, or the path of a user subroutine of Abaqus.
 ///
 /// # Errors
-/// There is none, or it cannot be used.
+/// It is missing, or it cannot be used.
 pub fn find(search: &SearchPath, opener: &Opener, name: &str) -> Result<LoadedLaw, Error> {
     let path = Path::new(name);
     let umat = if path.components().count() > 1 || name.ends_with(DLL_SUFFIX) {

@@ -24,7 +24,7 @@ pub enum Language {
     Fortran,
 }
 
-/// What a law is for.
+/// Purpose of a law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Kind {
     /// Jump to traction.
@@ -41,7 +41,7 @@ pub struct NewLaw {
     /// Language.
     #[arg(long, value_enum)]
     language: Language,
-    /// What the law is for.
+    /// Purpose of the law.
     #[arg(long, value_enum, default_value = "interface")]
     kind: Kind,
     /// Folder of the project; there must be none yet [default: ./NAME].
@@ -88,7 +88,7 @@ impl Language {
         }
     }
 
-    /// What stands beside it.
+    /// Neighbouring files.
     fn rest(self) -> Vec<File> {
         match self {
             Self::Rust => vec![
@@ -133,7 +133,7 @@ impl Language {
         }
     }
 
-    /// What an author has to know.
+    /// Notes for the author.
     fn notes(self) -> &'static str {
         match self {
             Self::Rust => template!("rust/notes.md"),

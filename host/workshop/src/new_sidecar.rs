@@ -30,7 +30,7 @@ pub struct NewSidecar {
     /// Name of the routine, if it is none of `umat_`, `umat`, `UMAT`, `UMAT_`.
     #[arg(long)]
     symbol: Option<String>,
-    /// The file to write; there must be none yet [default: NAME.law.toml beside libNAME.so].
+    /// The file to write; there must be none yet [default: NAME.law.toml next to libNAME.so].
     #[arg(long)]
     out: Option<PathBuf>,
 }

@@ -77,7 +77,7 @@ pub fn repeat(
     outcome
 }
 
-/// Where a capsule comes from, in words.
+/// Origin of a capsule, in words.
 fn from<'a>(origin: impl IntoIterator<Item = (&'a String, &'a toml::Value)>) -> String {
     let origin = origin.into_iter().map(|(key, value)| match value {
         toml::Value::String(text) => format!("{key} {text}"),

@@ -141,7 +141,7 @@ impl InterfaceLaw for CoulombJoint {
 }
 
 impl CoulombJoint {
-    /// The part of the increment in contact, or the gap at its end if there is none.
+    /// The part of the increment in contact, or the gap at its end if absent.
     #[inline]
     fn contact(&self, point: &InterfacePoint<State>) -> Result<Contact, f64> {
         let gap = point.state.gap;

@@ -20,7 +20,7 @@ pub(crate) struct Contact {
     pub(crate) state: State,
 }
 
-/// What slip has made of the joint, with its derivatives by it.
+/// State of the joint after a slip, with derivatives.
 #[derive(Clone, Copy, Debug)]
 struct Faded {
     /// μ.

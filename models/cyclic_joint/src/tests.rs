@@ -29,7 +29,7 @@ fn tan(degrees: f64) -> f64 {
     degrees.to_radians().tan()
 }
 
-/// Eq. (3), written anew.
+/// Eq. (3), written again.
 fn friction(p: &Parameters, xi: f64) -> f64 {
     let (peak, residual) = (tan(p.peak_friction_angle), tan(p.residual_friction_angle));
     residual + (peak - residual) * (-xi / p.friction_slip).exp()

@@ -26,7 +26,7 @@ fn joint(p: Parameters) -> HyperbolicJoint {
     HyperbolicJoint::new(p).unwrap()
 }
 
-/// Equations (2) to (4), written anew.
+/// Equations (2) to (4), written again.
 fn k_i(p: &Parameters, sigma: f64) -> f64 {
     p.stiffness_number
         * p.unit_weight_of_water

@@ -1,4 +1,4 @@
-//! What can be proved about the scalar equation over an interval of Δλ, from the values of μ and
+//! Bounds of the scalar equation over an interval of Δλ, from the values of μ and
 //! 1/cosh at its ends: both are monotonic on a leg.
 
 use crate::hardening::{Branch, sech_tanh};

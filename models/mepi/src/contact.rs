@@ -61,7 +61,7 @@ pub(crate) fn update(
     Ok(end)
 }
 
-/// The part of the increment in contact, or the gap at its end if there is none.
+/// The part of the increment in contact, or the gap at its end if absent.
 #[inline]
 fn contact(constants: &Constants, point: &InterfacePoint<State>) -> Result<Contact, f64> {
     let sigma = -point.traction[0];
@@ -158,7 +158,7 @@ fn close_or_slide(
     }
 }
 
-/// The flow by substeps. Where it loses contact, the rest of the increment is left to the implicit
+/// The flow by substeps. If it loses contact, the rest of the increment is left to the implicit
 /// scheme, which knows how contact is lost.
 #[cold]
 fn substeps(

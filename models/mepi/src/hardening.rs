@@ -1,7 +1,7 @@
 //! Friction μ and contraction rate β = `μ_c` − μ of one point as functions of the plastic slip ξ,
 //! with their derivatives: Eq. (10), (11), (16), (17).
 //!
-//! Letters are those of the paper. Products of them that have none:
+//! Letters are those of the paper. Products of them without overflow:
 //!
 //! | product | here | |
 //! |---|---|---|

@@ -240,7 +240,7 @@ impl Path<'_> {
     }
 }
 
-/// What a step of the tolerance drifts takes two; a start far outside takes more.
+/// Drift within tolerance needs two corrections; a start far outside needs more.
 const MAX_CORRECTIONS: usize = 20;
 
 /// The part of the normal stress over which contact may be lost without an estimate of the error.

@@ -48,7 +48,7 @@ const TABLE_2: Common = Common {
     sigma_ni: 100.0,
 };
 
-/// What the scheme's parameters are by default.
+/// Default parameters of the scheme.
 const IMPLICIT: SchemeParameters = SchemeParameters {
     scheme: 0.0,
     substeps: 10.0,

@@ -34,7 +34,7 @@ fn handy(tensile_strength: Option<f64>) -> Parameters {
     }
 }
 
-/// What the scheme's parameters are by default.
+/// Default parameters of the scheme.
 const IMPLICIT: SchemeParameters = SchemeParameters {
     scheme: 0.0,
     substeps: 10.0,

@@ -3,13 +3,13 @@
 use abi::Parameter;
 
 abi::parameters! {
-    /// What the curves of shaft and base have in common.
+    /// Common parts of the curves of shaft and base.
     pub struct Ground {
         /// Pressuremeter modulus of Ménard.
         pressuremeter_modulus: Parameter::new(c"E_M", c"kPa").above(0.0).usual(1e3, 1e6),
         /// Diameter of the pile.
         diameter: Parameter::new(c"D", c"m").above(0.0).usual(0.1, 5.0),
-        /// What the ground is: clay and silt, or sand and gravel.
+        /// Kind of ground: clay and silt, or sand and gravel.
         soil: Parameter::new(c"soil", c"-").one_of(abi::choices!(c"fine", c"granular")),
     }
 }
@@ -52,8 +52,8 @@ impl Curve {
         }
     }
 
-    /// After a movement, and the tangent. Eq. (4). What the sliders carry beyond their strengths at the
-    /// start is lost before they move.
+    /// After a movement, and the tangent. Eq. (4). Load of the sliders beyond their strengths at
+    /// the start is dropped before they move.
     #[inline]
     pub(crate) fn moved(&self, start: Mobilised, movement: f64) -> (Mobilised, f64) {
         let slider = |stress: f64, slope: f64, strength: f64| {

@@ -39,7 +39,7 @@ fn routines_that_begin_again_are_named() {
     }
 }
 
-/// What a routine does in the first increment of all, and with DDSDDE alone, changes no result.
+/// Actions of a routine in the very first increment, and on DDSDDE alone, change no result.
 #[test]
 fn routines_that_begin_once_are_not() {
     let Some(place) = place("begins") else {
@@ -70,7 +70,7 @@ fn a_step_kept_from_the_last_call_is_named() {
     assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
 }
 
-/// A routine that depends on the time may depend on that of the step, which is said all the same.
+/// A routine that depends on the time may depend on that of the step, which is reported all the same.
 #[test]
 fn the_time_of_a_step_is_asked_for_where_the_time_counts() {
     let Some(place) = place("begins") else {

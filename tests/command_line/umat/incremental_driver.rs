@@ -253,7 +253,7 @@ fn restrictions_that_contradict_each_other_are_not_met() {
     assert!(outcome.says("cannot be met"), "{}", outcome.stderr);
 }
 
-/// Runs the elastic routine through tests that must be refused, each with what is said.
+/// Runs the elastic routine through tests that must be refused, each with what is reported.
 fn refused(tests: &[(&str, &[&str])]) {
     let Some(place) = place("elastic") else {
         return;

@@ -1,4 +1,4 @@
-//! What can be said of a routine before it is run in earnest: `inspect`, `new-sidecar`, `laws`, `check`.
+//! What can be reported of a routine before it is run in earnest: `inspect`, `new-sidecar`, `laws`, `check`.
 
 use super::{BAD_INPUT, DONE, PLUGIN_TROUBLE, Place, number, place, rows};
 use crate::program::Outcome;
@@ -415,7 +415,7 @@ fn what_ends_many_checks_is_told_once() {
     }
 }
 
-/// What is wrong with a sidecar fails the check of it, and no other.
+/// A defect of a sidecar fails its check, and no other.
 #[test]
 fn a_wrong_sidecar_is_told_once() {
     let Some(place) = place("elastic") else {

@@ -3,7 +3,7 @@
 //! Goal        whatever a routine writes as its tangent, a case comes to the same equilibria by default
 //! Set-up      the chamber, most of it on a coarse mesh: hypoplastic sand that gives L, L + N D/|D| or differences; a
 //!             Mohr–Coulomb routine whose DDSDDE is exact, 2 % off at edges, transposed or elastic
-//! Asserts     all increments; the loads of the exact tangent; iterations; one line about it; nothing is said
+//! Asserts     all increments; the loads of the exact tangent; iterations; one line about it; nothing is reported
 //!             of laws with consistent tangents; the same bits after a stop
 
 use super::tolerance::summary;
@@ -11,7 +11,7 @@ use super::{gfortran, number, place, source};
 use crate::program::{DONE, Outcome, Place};
 use tests::case::table;
 
-/// What the solver leaves of a load, beside tolerances of 1e-9 and 1e-7.
+/// What the solver leaves of a load, next to tolerances of 1e-9 and 1e-7.
 const SAME: f64 = 1e-6;
 const NOTICED: &str = "are not the derivatives of its stresses";
 const REPLACED: &str = "from here on they are made by differences";

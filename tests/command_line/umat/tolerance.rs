@@ -1,4 +1,4 @@
-//! Routines that are right and were refused: with habits of their own, with much to say, with calls
+//! Routines that are right and were refused: with their own habits, with much to say, with calls
 //! that are never reached, with tangents by rows or of elasticity.
 
 use super::{driver, gfortran, number, place, rows, soil, source};

@@ -96,7 +96,7 @@ impl Memory<'_> {
         }
     }
 
-    /// The count that is said of a table: true, or beyond what is read.
+    /// The count that is reported of a table: true, or beyond what is read.
     fn declared(&mut self, n: usize) -> u32 {
         match self.byte() {
             250..=255 => u32::from_le_bytes(self.take()).max(LONGEST as u32 + 1),

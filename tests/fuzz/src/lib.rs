@@ -15,7 +15,7 @@ use input::{Error, Kind};
 use std::sync::OnceLock;
 use text::Source;
 
-/// What a target does with its bytes.
+/// Action of a target on its bytes.
 type Target = fn(&[u8]);
 
 /// All targets by name.
@@ -49,7 +49,7 @@ pub fn run(data: &[u8]) {
     target(data);
 }
 
-/// A text as a file beside those that it may be based on.
+/// A text as a file next to those that it may be based on.
 fn source(data: &[u8]) -> Option<Source> {
     let text = std::str::from_utf8(data).ok()?;
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/base/input.toml");

@@ -45,7 +45,7 @@ pub(crate) fn mesh(case: &Case) -> Result<Mesh, Error> {
 /// A mesh file of Gmsh.
 ///
 /// # Errors
-/// What is wrong with it.
+/// The defect.
 pub(crate) fn mesh_file(bytes: &[u8]) -> Result<Mesh, String> {
     input::gmsh::whole(bytes)
 }
@@ -70,7 +70,7 @@ pub(crate) fn incremental(files: [&Source; 3], n: usize) -> Result<usize, Error>
 /// A lock file: the number of laws in it.
 ///
 /// # Errors
-/// As when the case beside it is read.
+/// As when the case next to it is read.
 pub(crate) fn lock(source: &Source) -> Result<usize, Error> {
     Ok(Pins::of_lock(source)?)
 }
@@ -92,7 +92,7 @@ pub(crate) fn library_capsule(source: &Source) -> Result<Option<LibraryCapsule>,
 }
 
 /// Repeats the call of a capsule with the law of this name, wherever the capsule's library is.
-/// Returns what is said.
+/// Returns what is reported.
 ///
 /// # Errors
 /// As when a capsule is replayed.
@@ -128,7 +128,7 @@ pub(crate) fn manifest(bytes: &[u8]) -> Option<usize> {
 /// The behaviours of a library with MFront's generic interface.
 ///
 /// # Errors
-/// It has none.
+/// It is missing.
 pub(crate) fn behaviours(bytes: &[u8]) -> Result<Vec<LawDescription>, String> {
     adapter::behaviours(bytes)
 }

@@ -1,5 +1,5 @@
 //! A behaviour's call for one point. Programs of this interface call point by point, so what a call
-//! does beside the law's update is counted: sizes are constants, nothing is filled that is not read,
+//! does next to the law's update is counted: sizes are constants, nothing is filled that is not read,
 //! and what goes wrong is told out of the way.
 
 use super::{MOST_STATES, Settings, has_axes, n_properties};
@@ -64,7 +64,7 @@ pub struct Data {
 
 const _: () = assert!(size_of::<Data>() == 168);
 
-/// What a call is for.
+/// Purpose of a call.
 #[derive(Clone, Copy)]
 struct Request {
     /// The operator of the start only, nothing is carried.
@@ -153,7 +153,7 @@ struct Start<const N: usize> {
     forces: [f64; N],
 }
 
-/// What is asked for, and from where.
+/// The request, and its source.
 ///
 /// # Errors
 /// Why the call cannot be answered.
@@ -202,7 +202,7 @@ unsafe fn angle<L: Exported>(data: &Data) -> f64 {
     unsafe { *data.s1.material_properties.add(n_properties::<L>() - 1) }
 }
 
-/// All parameters in declared order. Of the properties those of the end of the increment: some
+/// All parameters in declared order. Properties are those of the end of the increment: some
 /// programs fill no others.
 ///
 /// # Safety
@@ -257,7 +257,7 @@ unsafe fn give_up(data: &Data, factor: f64) -> c_int {
 /// The reason why the results are inaccurate, if they are.
 ///
 /// # Errors
-/// Why there are none.
+/// Why none exist.
 ///
 /// # Safety
 /// As [`integrate`]; no array that is needed is null.

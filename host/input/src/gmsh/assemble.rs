@@ -35,7 +35,7 @@ struct Side {
 /// The mesh of a case, of a file.
 pub(super) struct Assembled {
     pub(super) mesh: Mesh,
-    /// Of each of its nodes the place in the file, from 0.
+    /// For each of its nodes the place in the file, from 0.
     pub(super) kept: Vec<usize>,
     /// What the user should know.
     pub(super) notes: Vec<String>,
@@ -61,7 +61,7 @@ struct Assembly<'a> {
 /// The mesh of a case.
 ///
 /// # Errors
-/// What is wrong with the file, and where.
+/// The defect of the file, and its place.
 pub(super) fn assemble(contents: &Contents<'_>, wanted: &Wanted<'_>) -> Result<Assembled, Fault> {
     let mut assembly = Assembly {
         contents,
@@ -486,7 +486,7 @@ impl Assembly<'_> {
         }
     }
 
-    /// Says if nodes stand at one place without being one: nothing holds elements together there.
+    /// Says if nodes are at one place without being one: nothing holds elements together there.
     fn note_cracks(&mut self, mesh: &Mesh) {
         let size = mesh.longer_side();
         let grain = if size > 0.0 { NOTHING * size } else { 1.0 };

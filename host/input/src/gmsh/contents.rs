@@ -62,7 +62,7 @@ impl<'a> Contents<'a> {
     /// Reads a file.
     ///
     /// # Errors
-    /// What is wrong with it, and where.
+    /// The defect, and its place.
     pub(super) fn read(bytes: &'a [u8]) -> Result<Self, Fault> {
         Self::read_by(Cursor::new(bytes))
     }
@@ -70,7 +70,7 @@ impl<'a> Contents<'a> {
     /// Reads what arrays were written as.
     ///
     /// # Errors
-    /// What is wrong with them, by their rows.
+    /// Their defects, by row.
     pub(super) fn read_arrays(bytes: &'a [u8]) -> Result<Self, Fault> {
         let mut cursor = Cursor::new(bytes);
         cursor.is_of_arrays = true;
@@ -191,7 +191,7 @@ impl<'a> Contents<'a> {
         (element.kind.dimension(), element.set)
     }
 
-    /// Nodes of an element, by their place in the file; beyond its own there is none, as [`NO_NODE`].
+    /// Nodes of an element, by their place in the file; beyond its own none exists, as [`NO_NODE`].
     ///
     /// # Errors
     /// There is no such node, or it has one twice.

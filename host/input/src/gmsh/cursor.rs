@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-/// What is wrong with a file, and where.
+/// The defect of a file, and its place.
 pub(super) type Fault = String;
 
 /// How numbers are written.
@@ -54,7 +54,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// What is wrong at a byte: with the line, or in a binary file the section and the byte; alone where the bytes
+    /// The defect at a byte: with the line, or in a binary file the section and the byte; alone where the bytes
     /// were made of arrays.
     pub(super) fn fault(&self, at: usize, message: &str) -> Fault {
         if self.is_of_arrays {
@@ -279,7 +279,7 @@ fn newlines(bytes: &[u8]) -> usize {
     bytes.split(|&b| b == b'\n').count() - 1
 }
 
-/// What stands in a file, as far as it can be shown.
+/// Content of a file, as far as it can be shown.
 fn shown(bytes: &[u8]) -> String {
     const MOST: usize = 40;
     let text = String::from_utf8_lossy(&bytes[..bytes.len().min(MOST)]);

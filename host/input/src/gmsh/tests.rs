@@ -14,7 +14,7 @@ mod formats;
 /// A part of the geometry: dimension, number, physical groups.
 type Entity = (u8, i32, Vec<i32>);
 
-/// What is in a file.
+/// Content of a file.
 #[derive(Clone)]
 struct Model {
     names: Vec<(u8, i32, &'static str)>,
@@ -44,7 +44,7 @@ const FORMATS: [(f64, Bytes); 10] = [
     (2.1, Bytes::Text),
 ];
 
-/// The square [0, 1]² as a quad, beside it [1, 2] × [0, 1] as two triangles, one of them inside out,
+/// The square [0, 1]² as a quad, next to it [1, 2] × [0, 1] as two triangles, one of them inside out,
 /// with a round right side; a node that belongs to nothing.
 fn model() -> Model {
     let places = [
@@ -307,7 +307,7 @@ impl Model {
     }
 }
 
-/// What a case takes.
+/// Names that a case takes.
 fn wanting(groups: &[&'static str], lines: &[&'static str]) -> Wanted<'static> {
     Wanted {
         groups: groups.iter().copied().zip(0..).collect(),
@@ -403,7 +403,7 @@ fn broken_files_are_refused() {
     }
 }
 
-/// What is wrong, a part of a file and what replaces it, and what the error says.
+/// The defect, a part of a file with its replacement, and the error.
 type Mistake = (&'static str, &'static str, &'static str, &'static str);
 
 const MISTAKES: [Mistake; 18] = [
@@ -667,7 +667,7 @@ supports = [{ line = "bottom", fixed = ["y"] }, { line = "corner", fixed = ["x"]
 phase = [{ name = "only", increments = 1 }]
 "#;
 
-/// The mesh of a case beside a file.
+/// The mesh of a case next to a file.
 fn built(name: &str, case: &str) -> Result<Built, String> {
     built_of(name, case, &model().write(4.1, Bytes::Big))
 }

@@ -13,8 +13,8 @@ const N_GUARD: usize = 24;
 /// Guard words on each side of an array of results: a number of a state variable that is wrong, or a DDSDDE of six
 /// components where there is room for four, ends in them, and not in the next array.
 const N_WIDE: usize = 256;
-/// What guard words hold: a signalling NaN. What is read there shows in the results, and what is
-/// computed with it and written back shows in the word, since every operation makes it a quiet one.
+/// What guard words hold: a signalling NaN. A read shows in the results. A computed value that is
+/// written back shows in the word, since every operation makes it a quiet NaN.
 const GUARD: u64 = 0x7ff4_dead_beef_dead;
 
 /// What an argument consists of.
@@ -32,7 +32,7 @@ pub(super) enum Role {
     Array,
     /// Write it.
     Output,
-    /// Read it. Its program computes it anew for every call, as is done here, so that nobody sees what a
+    /// Read it. Its program computes it again for every call, as is done here, so that nobody sees what a
     /// routine leaves there; some use it as their own.
     Copy,
     /// Read it: sizes, names and numbers, and the parameters, which all points share.
@@ -57,7 +57,7 @@ pub(super) struct Block<const N: usize> {
     /// Number of entries of every argument.
     entries: [usize; N],
     arguments: &'static [Argument; N],
-    /// What was handed over of what is only read, one after the other.
+    /// Read-only values that were handed over, one after the other.
     given: Vec<u64>,
     /// Guard words do not hold what they should.
     is_damaged: bool,
@@ -65,7 +65,7 @@ pub(super) struct Block<const N: usize> {
     beside: Option<Beside>,
 }
 
-/// Another number in guard words: in front of that argument, after the last one if there is none, or everywhere.
+/// Another number in guard words: in front of that argument, after the last one if absent, or everywhere.
 #[derive(Clone, Copy, Debug)]
 struct Beside {
     gap: Option<usize>,
@@ -73,7 +73,7 @@ struct Beside {
 }
 
 impl<const N: usize> Block<N> {
-    /// Arguments of so many entries, all of them zero.
+    /// Arguments of this many entries, all of them zero.
     pub(super) fn new(arguments: &'static [Argument; N], entries: [usize; N]) -> Self {
         let mut at = [0; N];
         let mut end = gap(None, arguments.first());
@@ -139,7 +139,7 @@ impl<const N: usize> Block<N> {
         other.map_or(GUARD, |other| other.word)
     }
 
-    /// Where they are, in words.
+    /// Their place, in words.
     fn place(&self, gap: usize) -> String {
         let beyond = gap.checked_sub(1).map(|i| {
             let (name, size) = (self.arguments[i].0, self.entries[i]);
@@ -203,7 +203,7 @@ impl<const N: usize> Block<N> {
         }
     }
 
-    /// Which copies a call has written to, by bits.
+    /// Copies that a call has written to, by bits.
     ///
     /// # Errors
     /// The first argument that it has written to without right, in words.
@@ -296,7 +296,7 @@ impl<const N: usize> Block<N> {
     }
 }
 
-/// What all calls of a material have in common, and blocks for them: as many as calls were made at a time.
+/// Data common to all calls of a material, and one block for each simultaneous call.
 #[derive(Debug)]
 pub(super) struct Blocks<const N: usize> {
     template: Block<N>,
@@ -318,7 +318,7 @@ impl<const N: usize> Blocks<N> {
     }
 
     /// Puts a number into the guard words in front of that argument, or all, of calls from now on; the usual one if
-    /// there is none. In words where that is; `None` if there is no such place.
+    /// none exists. In words where that is; `None` if there is no such place.
     pub(super) fn put_beside(&self, gap: Option<usize>, value: Option<f64>) -> Option<String> {
         if gap.is_some_and(|gap| gap > N) {
             return None;
@@ -387,7 +387,7 @@ mod tests {
         block
     }
 
-    /// What is said of a word, counted from the first one of an argument, that becomes 2.5.
+    /// The message about a word, counted from the first one of an argument, that becomes 2.5.
     fn said(argument: usize, word: isize) -> Result<u64, String> {
         let mut block = block();
         let at = block.at[argument].checked_add_signed(word).unwrap();

@@ -89,7 +89,7 @@ pub(super) fn describe(bytes: &[u8]) -> Result<Vec<LawDescription>, String> {
     Ok(names.map(|name| reader(name).describe().0).collect())
 }
 
-/// What one of our parameters is there.
+/// The counterpart of one of our parameters.
 #[derive(Clone, Debug, PartialEq)]
 enum Slot {
     Property,

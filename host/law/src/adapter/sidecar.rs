@@ -90,7 +90,7 @@ struct Internal {
     components: Option<Spanned<usize>>,
 }
 
-/// What DDSDDE is: a routine always writes one.
+/// Kind of DDSDDE: a routine always writes one.
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Given {
@@ -112,7 +112,7 @@ pub(super) struct Sidecar {
     pub(super) ntens: Vec<usize>,
     /// Calls need not follow one another.
     pub(super) is_thread_safe: bool,
-    /// How DDSDDE stands in memory.
+    /// How DDSDDE is in memory.
     pub(super) order: Order,
     /// What becomes of routines that nobody supplies, and of scratch files.
     pub(super) wishes: (Option<Externals>, Option<Scratch>),
@@ -124,7 +124,7 @@ impl Sidecar {
     /// Reads the sidecar of a library.
     ///
     /// # Errors
-    /// [`Error::Library`] if there is none, [`text::Error::Unreadable`]; [`text::Error::Input`] at the place
+    /// [`Error::Library`] if absent, [`text::Error::Unreadable`]; [`text::Error::Input`] at the place
     /// that does not fit.
     pub(super) fn read(library: &Path, given: Option<&Path>) -> Result<Self, Error> {
         let path = match given {
@@ -211,7 +211,7 @@ impl Sidecar {
     }
 }
 
-/// `libNAME.so` has `NAME.law.toml` or `libNAME.law.toml` beside it.
+/// `libNAME.so` has `NAME.law.toml` or `libNAME.law.toml` next to it.
 pub(super) fn find(library: &Path) -> Result<PathBuf, Error> {
     let stem = library.file_stem().unwrap_or_default().to_string_lossy();
     let names = [stem.strip_prefix("lib").unwrap_or(&stem), &stem];
@@ -283,8 +283,8 @@ pub(super) fn is_column(id: &str) -> bool {
     places.any(|place| place == id) || words.any(is_component)
 }
 
-/// Internal variables are columns of tables: each has a name of its own, which none of the others
-/// that stand there has.
+/// Internal variables are columns of tables: each has its own name, which none of the others
+/// that are there has.
 fn columns(source: &Source, internal: &[Internal]) -> Result<(), Error> {
     let mut seen = HashSet::new();
     for written in internal {

@@ -21,7 +21,7 @@ impl<'a> Symbols<'a> {
     /// Reads the symbol table.
     ///
     /// # Errors
-    /// What is wrong with the file, in words.
+    /// The defect of the file, in words.
     pub(super) fn read(bytes: &'a [u8]) -> Result<Self, String> {
         let file = object::File::parse(bytes).map_err(|why| format!("is no library: {why}"))?;
         if file.format() != object::BinaryFormat::Elf || !file.is_little_endian() || !file.is_64() {

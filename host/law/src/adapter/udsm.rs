@@ -122,7 +122,7 @@ pub(super) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Erro
     })
 }
 
-/// The routine in an image of its own, of a file that has not changed.
+/// The routine in its own image, of a file that has not changed.
 fn open_again(path: &Path, sha256: &str, traps: bool) -> Result<Routine, String> {
     let image = Image::read(path)?;
     if image.sha256 != sha256 {
@@ -255,7 +255,7 @@ fn asked(routine: Routine, model: i32, task: Task) -> Result<Block, String> {
     }
 }
 
-/// A text as PLAXIS takes it: its length may stand in its first character.
+/// A text as PLAXIS takes it: its length may be in its first character.
 fn readable(bytes: &[u8]) -> String {
     let end = bytes.iter().position(|b| *b == 0).filter(|end| *end > 0);
     let bytes = &bytes[..end.unwrap_or(bytes.len())];
@@ -364,7 +364,7 @@ impl ForeignLaw for Udsm {
     }
 }
 
-/// What all calls of a material have in common.
+/// Data common to all calls of a material.
 fn template(model: i32, n_states: usize, parameters: &[f64]) -> Block {
     let mut entries = [1; N_ARGUMENTS];
     for (argument, count) in [
@@ -400,12 +400,12 @@ struct Instance {
     blocks: Blocks<N_ARGUMENTS>,
     /// Components of the hypothesis.
     n: usize,
-    /// How D stands in memory.
+    /// How D is in memory.
     order: Order,
     time_dependent: bool,
     /// Whose turn it is: routines keep variables.
     turn: Mutex<()>,
-    /// Which of its copies the routine has overwritten, by bits, and which of them have been told.
+    /// Copies that the routine has overwritten, by bits, and those that have been reported.
     overwritten: AtomicU64,
     told: AtomicU64,
 }
@@ -590,7 +590,7 @@ impl Instance {
     }
 }
 
-/// Numbers that are none are a smaller increment's matter, unless there is no increment.
+/// NaNs call for a smaller increment, unless there is no increment.
 fn finite(block: &Block, result: A, is_at_rest: bool) -> Result<(), Refusal> {
     if block.reals(result).all(f64::is_finite) {
         return Ok(());

@@ -166,7 +166,7 @@ struct Sizes {
     n_props: usize,
 }
 
-/// What all calls of a material have in common.
+/// Data common to all calls of a material.
 fn template(sizes: Sizes, cmname: &str, parameters: &[f64]) -> Block {
     let n = sizes.n_tens;
     let mut entries = [1; N_ARGUMENTS];
@@ -209,7 +209,7 @@ fn template(sizes: Sizes, cmname: &str, parameters: &[f64]) -> Block {
     block
 }
 
-/// The first result that holds a number that is none.
+/// The first result that holds a NaN.
 fn not_finite(block: &Block) -> Option<&'static str> {
     let results = [A::Stress, A::Statev, A::Ddsdde];
     let mut bad = results.into_iter();
@@ -261,11 +261,11 @@ struct Instance {
     routine: Routine,
     blocks: Blocks<N_ARGUMENTS>,
     sizes: Sizes,
-    /// How DDSDDE stands in memory.
+    /// How DDSDDE is in memory.
     order: Order,
     /// Its response depends on the time.
     time_dependent: bool,
-    /// Which of its copies the routine has overwritten, by bits, and which of them have been told.
+    /// Copies that the routine has overwritten, by bits, and those that have been reported.
     overwritten: AtomicU64,
     told: AtomicU64,
     /// Whose turn it is, unless the routine says that it may be called by several threads.

@@ -2,7 +2,7 @@
 
 use super::Moment;
 
-/// What a law is doing.
+/// The current activity of a law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Doing {
     /// Fixing parameters.

@@ -1,4 +1,4 @@
-//! What a library has crashed in before it could be called, or after: loading, handshake, entry,
+//! Crashes of a library outside calls of its laws: loading, handshake, entry,
 //! description, `destroy` of null, the end of the process.
 
 use super::{Made, OutcomePart, place, text};
@@ -17,7 +17,7 @@ pub struct LibraryCapsule {
     version: u32,
     /// Which library, and what of it.
     pub library: LibraryPart,
-    /// Where it comes from, by key.
+    /// Its origin, by key.
     #[serde(rename = "where", default)]
     pub origin: IndexMap<String, toml::Value>,
     /// What became of it.
@@ -32,14 +32,14 @@ pub struct LibraryPart {
     pub path: PathBuf,
     /// SHA-256 of that.
     pub sha256: String,
-    /// What is done with it.
+    /// The action on it.
     pub phase: Phase,
     /// It is loaded from its file and not from the bytes that were hashed.
     #[serde(default)]
     pub from_file: bool,
     /// The law whose function is called.
     pub law: Option<String>,
-    /// What the library is made for, if not for the contract.
+    /// The program that the library is made for, if not for the contract.
     pub adapter: Option<Adapter>,
     /// What describes it.
     pub sidecar: Option<PathBuf>,

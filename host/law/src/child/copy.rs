@@ -12,7 +12,7 @@ pub fn can_be_copied() -> bool {
     std::fs::read_dir("/proc/self/task").is_ok_and(|threads| threads.count() == 1)
 }
 
-/// Copies this process, which is told the number of its copy; `None`: this is the copy.
+/// Copies this process and returns the number of the copy; `None`: this is the copy.
 ///
 /// # Errors
 /// The process cannot be copied, or the system has no room for one more.

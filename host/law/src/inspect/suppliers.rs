@@ -9,7 +9,7 @@ use text::file;
 
 /// Most libraries that are read for one.
 const MOST: usize = 200;
-/// Where loaders look when nothing else is said.
+/// Default folders of loaders.
 const USUAL: [&str; 6] = [
     "/lib/x86_64-linux-gnu",
     "/usr/lib/x86_64-linux-gnu",

@@ -1,4 +1,4 @@
-//! What a law prints in its workers: the first lines go to the error stream under the law's name,
+//! Output of a law in its workers: the first lines go to the error stream under the law's name,
 //! the others are counted. Never to the standard output, where tables go.
 
 use std::io::{self, Read, Write};
@@ -39,7 +39,7 @@ impl Printed {
         })
     }
 
-    /// Passes on what a worker prints, in a thread of its own, since a full pipe would stop it.
+    /// Passes on what a worker prints, in its own thread, since a full pipe would stop it.
     pub(super) fn follow(self: &Arc<Self>, source: Option<impl Read + Send + 'static>) -> Output {
         let (sender, end) = channel();
         let last = Arc::new(Mutex::new(String::new()));

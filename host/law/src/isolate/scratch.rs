@@ -1,4 +1,4 @@
-//! Folders in which routines leave what they write beside their results: each worker of a law works
+//! Folders in which routines leave what they write next to their results: each worker of a law works
 //! in one of its own.
 
 use super::printed::say;

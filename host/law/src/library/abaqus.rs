@@ -124,7 +124,7 @@ unsafe extern "C" fn stdb_abqerr_(
 }
 
 /// # Safety
-/// `n` characters stand there.
+/// `n` characters are there.
 unsafe fn characters(p: *const c_char, n: usize) -> String {
     // SAFETY: passed on to the caller.
     let bytes = unsafe { std::slice::from_raw_parts(p.cast::<u8>(), n) };
@@ -178,7 +178,7 @@ unsafe fn put(text: &str, name: *mut c_char, length: *mut c_int, n: usize) {
 /// The tensor at `s`; shear components are halved for strains.
 ///
 /// # Safety
-/// NDI + NSHR numbers stand there, NDI and NSHR are at most 3.
+/// NDI + NSHR numbers are there, NDI and NSHR are at most 3.
 unsafe fn tensor(s: *const f64, n_direct: usize, n_shear: usize, shear: f64) -> Matrix3<f64> {
     let mut matrix = Matrix3::zeros();
     for i in 0..n_direct.min(3) {

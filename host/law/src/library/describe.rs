@@ -1,4 +1,4 @@
-//! What a library says of its laws, copied out of its memory: nothing is believed but that structs, tables and texts
+//! Description of the laws of a library, copied out of its memory: nothing is believed but that structs, tables and texts
 //! are as long as they say.
 
 use super::{LawHandle, OpenLibrary};
@@ -147,7 +147,7 @@ fn unique<'a>(ids: impl Iterator<Item = &'a str>, what: &str) -> Result<(), Stri
 /// Copies the description of a library that was never loaded, such as one made of random bytes.
 ///
 /// # Errors
-/// What is wrong with it, in words.
+/// The defect, in words.
 ///
 /// # Safety
 /// Structs, tables and texts that it points to, directly or not, are as long as they say.

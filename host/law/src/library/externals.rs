@@ -26,9 +26,9 @@ const TRAP: usize = 32;
 /// Names that a library needs and nobody supplies.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Missing {
-    /// What is only called.
+    /// Symbols that are only called.
     pub(super) routines: BTreeSet<String>,
-    /// What is also read, written or handed on, for which no trap can stand.
+    /// Symbols that are also read, written or passed on; a trap cannot replace them.
     pub(super) data: BTreeSet<String>,
 }
 

@@ -88,11 +88,11 @@ fn read_message(buffer: &[c_char; MESSAGE_CAPACITY]) -> String {
     String::from_utf8_lossy(&bytes).trim().to_owned()
 }
 
-/// Values of many points in a slice: component `c` of point `i` stands at
+/// Values of many points in a slice: component `c` of point `i` is at
 /// `offset + i * point + c * component`.
 #[derive(Clone, Copy, Debug)]
 pub struct Strided {
-    /// Where the first value stands.
+    /// Position of the first value.
     pub offset: usize,
     /// Stride from point to point.
     pub point: usize,

@@ -78,7 +78,7 @@ impl Behaviour {
     /// Opens another image of the library, finds the function and sets parameters.
     ///
     /// # Errors
-    /// What is wrong with the library, in words.
+    /// The defect of the library, in words.
     pub(crate) fn open(
         path: &Path,
         image: Image,

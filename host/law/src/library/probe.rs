@@ -23,14 +23,14 @@ use std::mem::size_of;
 use std::path::Path;
 use std::ptr::{null, null_mut};
 
-/// What cells hold before a law has written them: a NaN that no computation makes.
+/// Content of cells before a law has written them: a NaN that no computation produces.
 const UNWRITTEN: f64 = f64::from_bits(0x7ff8_dead_beef_a5a5);
 /// The outcome of a point before the law has written one: no version of the contract has it.
 pub const NO_OUTCOME: Status = -0x5a5a;
 /// Size of this host's batch, in bytes.
 pub const BATCH_BYTES: usize = size_of::<Batch>();
 
-/// How the values of several points stand in memory.
+/// How the values of several points are in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Order {
@@ -69,7 +69,7 @@ pub struct PointStart {
     pub state0: Vec<f64>,
 }
 
-/// What a law has written for a point.
+/// Results of a law for a point.
 #[derive(Clone, Debug)]
 pub struct PointEnd {
     /// Outcome; [`NO_OUTCOME`] where none was written or none could be.
@@ -116,9 +116,9 @@ pub struct Form {
     pub request: u32,
     /// Layout of all arrays.
     pub order: Order,
-    /// What lies beside inputs.
+    /// What lies next to inputs.
     pub around_inputs: Fence,
-    /// What lies beside outputs.
+    /// What lies next to outputs.
     pub around_outputs: Fence,
     /// Writing to an input ends the process.
     pub inputs_locked: bool,
@@ -134,27 +134,27 @@ pub struct Form {
     pub time: f64,
     /// Length of the increment in time.
     pub time_increment: f64,
-    /// Which step and increment a routine is told; else those of [`Form::when`].
+    /// Numbers of step and increment for a routine; by default those of [`Form::when`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moment: Option<Moment>,
-    /// Where a routine is told that the points lie.
+    /// Coordinates of the points for a routine.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub site: Option<Site>,
     /// Ask for the consistent tangent even of a law that declares none; else its elastic operator
-    /// stands in, as in a run.
+    /// is in, as in a run.
     pub verbatim: bool,
 }
 
 /// Rates of what a point's update starts from.
 #[derive(Clone, Debug)]
 pub struct PointRates {
-    /// Of the gradient at the start.
+    /// The gradient at the start.
     pub gradient0: Vec<f64>,
-    /// Of the gradient at the end.
+    /// The gradient at the end.
     pub gradient1: Vec<f64>,
-    /// Of the flux at the start.
+    /// The flux at the start.
     pub flux0: Vec<f64>,
-    /// Of the internal variables at the start.
+    /// The internal variables at the start.
     pub state0: Vec<f64>,
 }
 
@@ -199,7 +199,7 @@ impl Form {
     }
 }
 
-/// Values of many points in pages of their own.
+/// Values of many points in their own pages.
 #[derive(Debug)]
 struct Array {
     pages: Pages,
@@ -346,7 +346,7 @@ pub struct CreateForm<'a> {
     pub formulation: u32,
     /// Values; none: null.
     pub values: Option<&'a [f64]>,
-    /// The number of values that is told.
+    /// The number of values that is passed.
     pub n_values: usize,
     /// Size of the message buffer; none: null.
     pub message: Option<usize>,
@@ -473,7 +473,7 @@ pub(crate) fn create(id: &str, law: LawHandle, form: &CreateForm<'_>) -> io::Res
 /// Fixes the parameters of a law behind an adapter, which gets those of the form and nothing else of it.
 ///
 /// # Errors
-/// What is kept of the call cannot be written.
+/// The record of the call cannot be written.
 pub(crate) fn create_foreign(
     id: &str,
     law: &dyn ForeignLaw,
@@ -551,7 +551,7 @@ impl Probe {
         self.n_states
     }
 
-    /// Where its instance stands in memory; 0 of a law behind an adapter.
+    /// Address of its instance; 0 for a law behind an adapter.
     pub fn address(&self) -> usize {
         match &self.instance {
             Held::Own(own) => own.instance.addr(),
@@ -559,7 +559,7 @@ impl Probe {
         }
     }
 
-    /// Whether the law has `init_state`; one behind an adapter says so when it is asked.
+    /// Whether the law has `init_state`; one behind an adapter reports it when it is asked.
     fn has_init_state(&self) -> bool {
         match &self.instance {
             Held::Own(own) => own.law.known.init_state.is_some(),
@@ -577,7 +577,7 @@ impl Probe {
     }
 
     /// Puts a number between the arguments of a routine behind an adapter, in front of that argument or everywhere,
-    /// for calls from now on; the usual one if there is none: what is read there shows. In words where that is; `None`
+    /// for calls from now on; the usual one if absent: what is read there shows. In words where that is; `None`
     /// if there is no such place.
     pub fn put_beside(&self, gap: Option<usize>, value: Option<f64>) -> Option<String> {
         match &self.instance {
@@ -840,7 +840,7 @@ impl Probe {
         }))
     }
 
-    /// A point before anything is written, with so many entries of an operator.
+    /// A point before anything is written, with this many entries of an operator.
     fn nothing_yet(&self, n_operator: usize) -> PointEnd {
         PointEnd {
             status: NO_OUTCOME,
@@ -851,7 +851,7 @@ impl Probe {
         }
     }
 
-    /// A call through an adapter, which has arrays of its own: requests, times and places are those of the form.
+    /// A call through an adapter, which has separate arrays: requests, times and places are those of the form.
     fn call_foreign(
         &self,
         instance: &dyn ForeignInstance,
@@ -944,7 +944,7 @@ impl Directions {
         })
     }
 
-    /// What the law has written.
+    /// The output of the law.
     fn rows(&self) -> Vec<EndRates> {
         let n = self.flux1.n_points;
         let row = |i| (self.flux1.row(i), self.state1.row(i));
@@ -1010,7 +1010,7 @@ fn symbols(path: &Path) -> Result<&'static libloading::Library, String> {
 /// Compares the handshake block with this host's.
 ///
 /// # Errors
-/// There is none, or the first field that differs.
+/// It is missing, or the first field that differs.
 pub fn shake_hands(path: &Path) -> Result<(), String> {
     // SAFETY: contract, "Handshake": `pilum_magic` is a data symbol of this type for ever.
     let magic = unsafe { symbols(path)?.get::<*const MagicBlock>(b"pilum_magic\0") }

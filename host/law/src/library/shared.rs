@@ -56,7 +56,7 @@ impl SharedMemory {
         self.len() == 0
     }
 
-    /// Makes room for so many words.
+    /// Makes room for this many words.
     ///
     /// # Errors
     /// The system's.

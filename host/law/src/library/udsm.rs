@@ -51,7 +51,7 @@ impl Routine {
     /// they stand for what it calls and nobody supplies.
     ///
     /// # Errors
-    /// What is wrong with the library, in words.
+    /// The defect of the library, in words.
     pub(crate) fn open(path: &Path, image: Image, traps: bool) -> Result<Self, String> {
         let library = open_private(path, image, traps)?;
         // SAFETY: the user says by the adapter that a symbol of this name is a `User_Mod`.
@@ -85,7 +85,7 @@ impl Routine {
         call();
     }
 
-    /// How many models there are, if the library says so.
+    /// How many models there are, if the library reports it.
     pub(crate) fn n_models(self) -> Option<i32> {
         // SAFETY: the user says by the adapter what a symbol of this name is.
         let count = unsafe { find::<CountAll>(self.library, "GetModelCount") }?;

@@ -132,7 +132,7 @@ fn supply(_: &Path, _: &str, traps: bool, why: String) -> Result<libloading::Lib
 }
 
 /// Loads the hashed bytes once more. Where that fails (no files in memory, a library that looks
-/// for others beside itself) the file itself is loaded, which gives the same image every time: a
+/// for others next to itself) the file itself is loaded, which gives the same image every time: a
 /// second one is refused.
 ///
 /// # Safety

@@ -6,8 +6,8 @@ use crate::group::Group;
 /// A node, or a degree of freedom, that several bodies have in common, or none.
 pub const SHARED: u32 = u32::MAX;
 
-/// The bodies of a model: nodes that elements, interfaces or ties connect. Where both displacements
-/// of a node are prescribed, nothing passes from one side of it to the other.
+/// The bodies of a model: nodes that elements, interfaces or ties connect. If both displacements of
+/// a node are prescribed, nothing passes from one side of it to the other.
 #[derive(Debug, Default)]
 pub struct Bodies {
     /// Body of every node, or [`SHARED`].
@@ -131,8 +131,8 @@ impl Joined {
     }
 }
 
-/// 2-norms by body of a vector whose entries belong to these bodies, or to none; of all of it where
-/// no bodies are told apart.
+/// 2-norms by body of a vector whose entries belong to these bodies, or to none; the norm of the
+/// whole vector if there is one body only.
 pub fn norms(bodies: &[u32], n: usize, v: &[f64]) -> Vec<f64> {
     if bodies.is_empty() {
         return vec![squares(v).sqrt()];

@@ -15,7 +15,7 @@ const PARTS: usize = 4;
 /// Matrices of the elements of a [`System`] and their sum, for the next time they are added up.
 #[derive(Debug, Default)]
 pub struct Elements {
-    /// Of every group.
+    /// For every group.
     pieces: Vec<Vec<Piece>>,
     values: Vec<f64>,
     largest: Vec<f64>,
@@ -33,13 +33,13 @@ impl Elements {
         &self.largest
     }
 
-    /// Of every equation, whether its row and its column may differ from those of the time before; an
+    /// For every equation, whether its row and its column may differ from those of the time before; an
     /// entry differs only where both of its equations may.
     pub fn changed(&self) -> &[bool] {
         &self.changed
     }
 
-    /// The matrix, which is not there any longer.
+    /// The matrix, which no longer exists.
     pub fn take(&mut self) -> Vec<f64> {
         std::mem::take(&mut self.values)
     }
@@ -103,7 +103,7 @@ impl System {
 
     /// As [`Self::assemble`], for the same bits with less work: matrices of elements whose tangents
     /// are those of the last time are still there, and so are sums of nothing else. `kept` is one of
-    /// this system alone. Of a matrix that never changes nothing else is kept.
+    /// this system alone. If the matrix never changes, nothing else is kept.
     pub fn assemble_after(&self, kept: &mut Elements, groups: &[Group]) {
         let Elements {
             pieces,
@@ -222,7 +222,7 @@ struct Part<'v> {
 }
 
 impl Part<'_> {
-    /// Those of its columns that have changed, and where their values stand in this part.
+    /// Those of its columns that have changed, and the positions of their values in this part.
     fn changed<'s>(
         &self,
         system: &'s System,

@@ -1,8 +1,8 @@
 //! Strains that are not those at the points where the law is evaluated.
 //!
-//! With few points an element follows plastic flow and the incompressible without locking, but few points
-//! do not integrate exactly what is weighted with the radius: stresses that are in equilibrium with a
-//! weight would leave nodal forces over. Here the law's points q carry functions ψ_q, one at their own
+//! With few points an element follows plastic and incompressible flow without locking. But few
+//! points do not integrate terms with the radius exactly: stresses in equilibrium with a weight
+//! would leave nodal forces. Here the law's points q carry functions ψ_q, one at their own
 //! point and zero at the others, made of 1, x, y, and of quads ξη (so where sides are straight, bilinear
 //! between the 2 × 2 points of a quad, linear between the 3 of a triangle), and the stress of the element is
 //!

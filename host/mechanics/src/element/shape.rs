@@ -20,10 +20,10 @@ pub(super) struct Reference<const N: usize> {
     pub(super) exact_curved: fn() -> Vec<RulePoint>,
     /// Corners and middle of every side.
     pub(super) sides: &'static [[usize; 3]],
-    /// Of a few points of the law, the function that is one at the first and zero at the others, at
-    /// the second.
+    /// The function that is one at the first point and zero at the other points of the law,
+    /// evaluated at the second argument.
     pub(super) function: fn([f64; 2], [f64; 2]) -> f64,
-    /// What such functions are made of besides what is linear, where there are so many points along ξ and along η.
+    /// What such functions are made of besides what is linear, where there are this many points along ξ and along η.
     pub(super) beyond_linear: fn([usize; 2], [f64; 2]) -> Vec<f64>,
 }
 

@@ -46,7 +46,7 @@ pub(super) struct Point<const N: usize> {
     pub(super) position: [f64; 2],
 }
 
-/// Where the law of an element is evaluated, and how its strains come about.
+/// Integration points of the law, and the strains there.
 #[derive(Clone, Debug)]
 pub(super) struct Rule {
     /// Points of the law.

@@ -500,7 +500,7 @@ fn bent_quads_carry_a_linear_stress() {
 }
 
 /// Nodes do not integrate N t r where all three grow along a side, nor anything on a curve; where the radius is the same,
-/// or there is none, they do.
+/// or none exists, they do.
 #[test]
 fn tractions_that_are_gathered_at_nodes_have_exact_nodal_forces() {
     use super::Joint6;

@@ -13,11 +13,10 @@
 //!
 //! which is all that the iterations see. Δu_i follows from the first of (1) when it is wanted.
 //! Everything is counted from the last state that was completed.
-//! Unknowns that some phases of the run prescribe and others do not are kept beside the boundary, for one
-//! factorisation that serves all phases: see `aside`.
-//! Where only some groups are looked at (the pile whose forces are wanted, not the sand), or some elements
-//! (those at its head), they alone are brought to the state in question, counted from the one before it; the
-//! others wait for the next complete one.
+//! Unknowns that some phases of the run prescribe and others do not are kept with the boundary, so
+//! that one factorisation serves all phases: see `aside`.
+//! If results need only some groups (the pile, not the sand), or some elements (those at its head),
+//! only these are updated, from the state before. The others wait for the next complete state.
 
 mod aside;
 mod excerpt;
@@ -41,7 +40,7 @@ use std::sync::Arc;
 /// What results look at.
 #[derive(Clone, Copy, Debug)]
 pub struct LookedAt<'l> {
-    /// Of every group of the model, whether they do.
+    /// For every group of the model, whether they do.
     pub groups: &'l [bool],
     /// Elements of every group that they look at where they do not at all of it, ascending.
     pub elements: &'l [Vec<usize>],
@@ -59,7 +58,7 @@ struct Origin {
     moved: Vec<f64>,
 }
 
-/// Where a domain stands.
+/// State of a domain.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Standing {
     /// The last complete state.
@@ -68,7 +67,7 @@ pub struct Standing {
     latest: Origin,
     /// Internal forces on the boundary in that state.
     forces: Vec<f64>,
-    /// Of every group of the model, whether it belongs to that part; `None` if the latest state is
+    /// For every group of the model, whether it belongs to that part; `None` if the latest state is
     /// the complete one.
     part: Option<Vec<bool>>,
     /// Elements of other groups that are in the latest state, and theirs in the complete one.
@@ -90,16 +89,16 @@ pub struct LinearDomain {
     pub largest: f64,
     /// Largest entry of its matrix before it was condensed.
     pub stiffest: f64,
-    /// 2-norm of that one's diagonal, and of what stands there for unknowns that are kept.
+    /// 2-norm of its diagonal, and of the diagonal of the kept unknowns.
     diagonal: f64,
     diagonal_kept: f64,
     /// Degrees of freedom of the boundary, in the order of its stiffness.
     boundary: Vec<usize>,
-    /// Of every unknown, whether it is one of them.
+    /// For every unknown, whether it is one of them.
     on_boundary: Vec<bool>,
-    /// Of every unknown, whether it is prescribed in this phase, though not in all of them.
+    /// For every unknown, whether it is prescribed in this phase, but not in all phases.
     is_held: Vec<bool>,
-    /// What is kept beside the boundary, if anything is.
+    /// The unknowns kept with the boundary, if any.
     aside: Option<Aside>,
     /// S.
     stiffness: Dense,
@@ -114,7 +113,7 @@ pub struct LinearDomain {
     whole: Option<Part>,
 }
 
-/// Of every unknown of a system, whether the rest shares it, or some phases prescribe it.
+/// For every unknown of a system, whether the rest shares it, or some phases prescribe it.
 fn kept(system: &System, rest: &System, sometimes: &[bool]) -> Vec<bool> {
     let free = system.free().iter();
     let mut kept: Vec<bool> = free.map(|&dof| sometimes[dof]).collect();
@@ -220,7 +219,7 @@ fn mirror(matrix: &mut [f64], n: usize) {
 
 impl LinearDomain {
     /// Condenses those of the groups that are to be `condensed`, all of them linear, of a mesh whose nodes lie
-    /// on these lines. `None` if there are none, or if it does not pay and is not wanted `always`.
+    /// on these lines. `None` if no group is linear, or if it saves no time and is not wanted `always`.
     ///
     /// # Errors
     /// [`Singular`] if they are not held where they are not connected to the rest.
@@ -383,14 +382,14 @@ impl LinearDomain {
         internal
     }
 
-    /// Whether a group is one of its own.
+    /// Whether a group belongs to it.
     pub fn includes(&self, group: usize) -> bool {
         self.system.includes(group)
     }
 
     /// Sets up a phase that starts from the groups' committed state, with these
-    /// [internal forces](Self::internal_forces), and these displacements. Forces inside that change by noise
-    /// beside the tolerance are taken for unchanged.
+    /// [internal forces](Self::internal_forces), and these displacements. Interior forces that
+    /// change by much less than the tolerance count as unchanged.
     pub fn start(
         &mut self,
         groups: &[Group],
@@ -441,7 +440,7 @@ impl LinearDomain {
         self.standing = standing.clone();
     }
 
-    /// Where a part of the groups was looked at: the forces that the domain takes from its
+    /// If only a part of the groups was updated: the forces that the domain takes from its
     /// boundary, by degree of freedom. `None` if all groups were.
     pub fn forces_beside(&self) -> Option<Vec<(usize, f64)>> {
         let forces = self.boundary.iter().zip(&self.standing.forces);
@@ -449,7 +448,7 @@ impl LinearDomain {
         self.standing.part.is_some().then(|| forces.collect())
     }
 
-    /// Where the domain stands.
+    /// State of the domain.
     pub fn standing(&self) -> &Standing {
         &self.standing
     }

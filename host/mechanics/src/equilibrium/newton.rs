@@ -13,7 +13,7 @@
 //! | [`failure`], [`cause`] | why a step failed; what is found out about that |
 //! | [`loads`], [`outcome`] | what goes in and what comes out |
 //!
-//! Displacements and forces are vectors by place ([`Places`]) if nothing else is said.
+//! Displacements and forces are vectors by place ([`Places`]) unless stated otherwise.
 
 mod acceleration;
 mod acceptance;
@@ -90,11 +90,11 @@ pub struct Newton<'a> {
     /// Unknowns.
     system: &'a System,
     places: &'a Places,
-    /// Linear groups that stand beside the system as one element.
+    /// Linear groups, condensed to one element next to the system.
     domain: Option<&'a LinearDomain>,
     /// Equations.
     solver: &'a mut LinearSolver,
-    /// What is factorised.
+    /// The equations that are factorised.
     matrix: &'a mut Matrix,
     /// Elements and their state.
     groups: &'a mut [Group],
@@ -104,7 +104,7 @@ pub struct Newton<'a> {
     costs: &'a mut Costs,
     /// Largest of the forces at the start of the phase, by body.
     at_start: Vec<f64>,
-    /// What is given to the step.
+    /// References of the step.
     given: Given,
     /// Sizes of the last correction, by body.
     changes: Vec<Change>,
@@ -112,7 +112,7 @@ pub struct Newton<'a> {
     runaway: Option<Runaway>,
     /// What the last evaluation asked the laws for.
     tangents: Operator,
-    /// What decides whether the matrix is kept.
+    /// Data that decide whether the matrix is kept.
     kept: Kept,
     /// Forces of the domain at the end of the step if its boundary stays where it is.
     domain_forces: Vec<f64>,
@@ -218,7 +218,7 @@ impl<'a> Newton<'a> {
     }
 
     /// The same in two halves, the first of which starts from a guess and is
-    /// committed. What it returns is of the whole step, the iterations are those of the second half.
+    /// committed. It returns the whole step, with the iterations of the second half.
     ///
     /// # Errors
     /// As [`Self::step`].
@@ -329,7 +329,7 @@ impl<'a> Newton<'a> {
 }
 
 impl Equilibrium {
-    /// What is handed out of a step.
+    /// Outcome of a step.
     fn reached(self, iterations: Vec<Iteration>, relaxed: bool) -> StepSuccess {
         let balance = self.state.balance;
         StepSuccess {

@@ -4,7 +4,7 @@ use super::Loading;
 use crate::group::Group;
 use crate::problem::{Problem, Water};
 
-/// What acts at one time: a part of the way between two loadings, each with the groups that are there.
+/// Body forces at one time: a part of the way between two loadings, each with its active groups.
 #[derive(Clone, Debug, Default)]
 pub struct Acting {
     start: Loading,
@@ -68,7 +68,7 @@ impl Acting {
     }
 
     /// Nodal forces of weight and pore water in group `number`, or in some of its elements, by degree of
-    /// freedom; `None` if there is neither. What its stresses leave beside them comes from others.
+    /// freedom; `None` if there is neither. Other forces balance the rest of its stresses.
     pub fn in_bodies(
         &self,
         problem: &Problem,

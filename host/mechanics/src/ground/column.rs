@@ -1,4 +1,4 @@
-//! What stands above a point, on the same vertical.
+//! Overburden: the weight above a point, on the same vertical.
 
 use crate::mesh::{Mesh, Solid};
 use crate::problem::Water;
@@ -11,7 +11,7 @@ const STRAIGHT: f64 = 1e-12;
 pub struct Columns<'m> {
     mesh: &'m Mesh,
     water: Option<&'m Water>,
-    /// Unit weight of every solid above and below the water; `None` of one that is not there.
+    /// Unit weight of every solid above and below the water; `None` for an inactive one.
     weights: Vec<Option<[f64; 2]>>,
     /// Lower and upper corner of every solid.
     boxes: Vec<[[f64; 2]; 2]>,
@@ -22,8 +22,8 @@ pub struct Columns<'m> {
 }
 
 impl<'m> Columns<'m> {
-    /// Of a mesh whose groups have these unit weights (above and below the water, kN/m³); `None` of a
-    /// group that is not there.
+    /// Of a mesh whose groups have these unit weights (above and below the water, kN/m³); `None`
+    /// for an inactive group.
     pub fn new(
         mesh: &'m Mesh,
         water: Option<&'m Water>,
@@ -81,7 +81,7 @@ impl<'m> Columns<'m> {
     }
 
     /// Total vertical stress at a point, compression positive, kPa: the weight of all elements above it
-    /// on the same vertical, and of the water that stands on the uppermost.
+    /// on the same vertical, and of free water on the uppermost.
     pub fn above(&self, [x, y]: [f64; 2]) -> f64 {
         let level = self.water.map(|water| water.level.at(x));
         let (mut sum, mut top) = (0.0, y);
@@ -202,7 +202,7 @@ impl Crossings {
         self.n += 1;
     }
 
-    /// Where the vertical is inside: every second interval between the crossings.
+    /// Intervals of the vertical inside the elements: every second one between the crossings.
     fn chords(&mut self) -> &[[f64; 2]] {
         let heights = &mut self.heights[..self.n];
         heights.sort_unstable_by(f64::total_cmp);
@@ -295,7 +295,7 @@ mod tests {
         }
     }
 
-    /// Ground around a circle: the elements outside are entered twice by verticals beside its springline,
+    /// Ground around a circle: the elements outside are entered twice by verticals next to its springline,
     /// and what stands above a point is the whole height all the same.
     #[test]
     fn a_concave_side_is_entered_twice() {

@@ -5,15 +5,15 @@ use crate::mesh::Mesh;
 use crate::problem::{InitialStress, Problem};
 use std::collections::HashMap;
 
-/// A point on an interface is taken this far into the element beside it, as a fraction of the way to its
-/// middle, so that it is told which column it stands in.
+/// A point on an interface is moved this far into the adjacent element, as a fraction of the way to
+/// its middle, so that its column is unique.
 const INSIDE: f64 = 1e-9;
 
 /// The stresses before the first phase, at any point of any group.
 pub(crate) struct InitialStresses<'p> {
     problem: &'p Problem,
     columns: Option<Columns<'p>>,
-    /// Of every group, its own.
+    /// For every group, its own.
     surcharges: Vec<Option<f64>>,
     /// Element on the outside of a joint's face, by the node in the face's middle.
     beside: HashMap<usize, usize>,
@@ -48,7 +48,7 @@ impl<'p> InitialStresses<'p> {
     }
 
     /// Stress of a solid group at a point, components 11 22 33 12 in global axes, tension positive, kPa.
-    /// `None` if the group has none.
+    /// `None` if the group has no initial stress.
     pub(crate) fn at(&self, number: usize, at: [f64; 2]) -> Option<[f64; 4]> {
         let group = &self.problem.groups[number];
         Some(match group.initial_stress.as_ref()? {
@@ -108,7 +108,7 @@ impl<'p> InitialStresses<'p> {
     }
 }
 
-/// Element beside each face of every joint, by the node in the face's middle.
+/// Element at each face of every joint, by the node in the face's middle.
 pub(crate) fn beside_joints(mesh: &Mesh) -> HashMap<usize, usize> {
     let joints = mesh.joints.iter();
     let mut beside: HashMap<usize, Option<usize>> = joints

@@ -18,7 +18,7 @@ pub struct Loading {
     pub unit_weight: Vec<[f64; 2]>,
     /// Water table.
     pub water_level: Option<Profile>,
-    /// Of every group, whether it is there.
+    /// For every group, whether it is active.
     pub active: Vec<bool>,
     /// Lines whose supports have been given up, with the components.
     pub freed: BTreeMap<String, [bool; 2]>,
@@ -316,7 +316,7 @@ impl Loading {
     }
 }
 
-/// Weights of elements in which water stands, by number within the group and among the solids: what
+/// Weights of elements that contain the water table, by number within the group and among the solids: what
 /// balances the vertical stress of the same ground, −σ_22 = γ (level − y) with γ of either side, so that
 /// ground at rest is at rest.
 fn add_cut_weights(

@@ -2,7 +2,7 @@
 
 use super::{Field, Group};
 
-/// What a step has made of a group: committed and trial values of all fields, and tangents.
+/// State of a group after a step: committed and trial values of all fields, and tangents.
 #[derive(Debug)]
 pub struct Aside {
     fields: Vec<Field>,

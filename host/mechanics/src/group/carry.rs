@@ -37,7 +37,7 @@ impl Group {
         outcome
     }
 
-    /// What the points that are wanted, or all, answer to these gradients at the end of the increment.
+    /// Response of the requested points, or of all, to these gradients at the end of the increment.
     pub(super) fn carry(
         &self,
         (gradient_end, wanted): (&[f64], Option<&[bool]>),
@@ -113,8 +113,8 @@ impl Group {
         together(outcomes)
     }
 
-    /// What one point answers to these gradients at the end of the increment: fluxes, and the operator, if
-    /// one is wanted. `None` where the law fails.
+    /// Response of one point to these gradients at the end of the increment: fluxes, and the
+    /// operator if requested. `None` where the law fails.
     pub(super) fn answer(
         &self,
         point: usize,

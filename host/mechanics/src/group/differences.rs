@@ -1,9 +1,9 @@
 //! Tangents by central differences of the law's own answers, where its own tangents are no derivatives of
 //! them. Whether one is, is asked of every point in one direction.
 //!
-//! A point is moved by a small share of its own increment: what it answers there is what the law does along
-//! the path that it is on, however its update is integrated. Where nothing moves the law's own tangent
-//! stands.
+//! A point is moved by a small share of its increment. Its response there is that of the law along
+//! the current path, however the update is integrated. If nothing moves, the law's own tangent is
+//! used.
 
 use super::{Field, Group, PER_TASK};
 use crate::settings::Tangents;
@@ -27,13 +27,13 @@ const RIGHT: f64 = 1e-3;
 pub enum Reason {
     /// The settings ask for it.
     Asked,
-    /// The law says that its tangents are approximate, or that it has none.
+    /// The law declares its tangents approximate or missing.
     Declared,
     /// They were found not to be the derivatives of the stresses.
     Noticed,
 }
 
-/// Where a group's tangents come from, and what is known of those of its law.
+/// Source of a group's tangents, and the findings about those of its law.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Origin {
     /// They are differences, for this reason.
@@ -146,8 +146,8 @@ impl Group {
         })
     }
 
-    /// Tangents of some points by differences of these sizes about the trial state. Where the law fails on
-    /// one side the other one counts; where it does on both, a column stays.
+    /// Tangents of some points by differences of these sizes about the trial state. If the law
+    /// fails on one side, the other side counts; if it fails on both, the column is unchanged.
     fn differentiate(
         &mut self,
         sizes: &[f64],
@@ -193,7 +193,7 @@ impl Group {
     }
 
     /// Whether this component of the gradient ever differs from zero: laws need not know of strains out of
-    /// the plane where there are none (the third of four components), nor say what they would call forth.
+    /// the plane where absent (the third of four components), nor say what they would call forth.
     pub(super) fn moves(&self, component: usize) -> bool {
         let n = self.law.built.law.n_components();
         let Field { committed, trial } = self.gradient();

@@ -1,4 +1,4 @@
-//! Nodes that are one: the interface between them is not there.
+//! Tied faces: nodes that move as one because the interface between them is inactive.
 
 use super::Group;
 use crate::problem::Formulation;

@@ -48,7 +48,7 @@ impl Layer {
         }
     }
 
-    /// Takes the elastic operators of a law that starts now, anew or with other parameters.
+    /// Takes the elastic operators of a law that starts now, or restarts with other parameters.
     pub(super) fn start(&mut self, operators: &[f64], anew: bool) {
         if anew {
             self.jump.committed.fill(0.0);

@@ -2,8 +2,8 @@
 //! few of those where they do not fit are held against differences of the law's own answers about the
 //! increment that they went through last.
 //!
-//! Where both sides and two sizes of differences agree, the stress has a derivative, and the tangent has to
-//! be it. At a kink, or where the answers are noise, they do not, and nothing is said of the tangent.
+//! If both sides and two sizes of differences agree, the stress has a derivative, and the tangent
+//! has to equal it. At a kink, or in noise, they differ, and the tangent is not judged.
 
 use super::Group;
 use super::differences::{Origin, Reason};
@@ -13,8 +13,8 @@ use law::{End, Operator, Strided};
 const SIZES: [f64; 2] = [1e-2, 1e-3];
 /// Gradients beyond this (strains of 100 %, jumps of 1 m) are those of iterates that lead nowhere.
 const ABSURD: f64 = 1.0;
-/// A tangent is off by more than this share of its largest entry, and by so many times what the slopes
-/// differ among themselves.
+/// A tangent is off by more than this share of its largest entry, and by this many times the
+/// scatter of the slopes.
 const OFF: f64 = 5e-3;
 const BEYOND: f64 = 4.0;
 /// Points that move most, and others, each as many, out of those that are suspected.
@@ -23,8 +23,8 @@ const POINTS: usize = 6;
 /// wrong.
 const SEVERAL: usize = 2;
 const SHARE: f64 = 0.3;
-/// After so many looks at which they were wrong, or were right without a break, none is taken any more of
-/// steps that come to equilibrium.
+/// After this many checks that found them wrong, or right without a break, steps that reach
+/// equilibrium are no longer checked.
 const TWICE: u8 = 2;
 const OFTEN: u8 = 8;
 
@@ -42,13 +42,13 @@ pub struct Deviation {
 pub enum Went {
     /// It took more iterations than consistent tangents mostly need.
     Slowly,
-    /// It took so many that differences would have cost less.
+    /// It took so much longer that differences would have cost less.
     Badly,
     /// It found no equilibrium.
     Wrong,
 }
 
-/// What has come out about a law's tangents.
+/// Findings about a law's tangents.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Notice {
     /// How far they are off.
@@ -134,7 +134,7 @@ impl Group {
     }
 
     /// Points whose tangents are not what the stresses do in one direction: those that move most, and some
-    /// of the others. `None` where nothing can be said.
+    /// of the others. `None` if they cannot be judged.
     fn suspects(&self, period: (f64, f64)) -> Option<Vec<usize>> {
         let n = self.law.built.law.n_components();
         let gradient = self.gradient();

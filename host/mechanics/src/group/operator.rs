@@ -4,8 +4,8 @@ use super::Group;
 use law::{End, Operator, Start, Strided, calls};
 
 impl Group {
-    /// The law's elastic operator at a point of solids in the committed state, row by row. `None` if the
-    /// law has none there.
+    /// The law's elastic operator at a point of solids in the committed state, row by row. `None`
+    /// if the law has no operator there.
     pub fn elastic_operator(&self, point: usize) -> Option<Vec<f64>> {
         let n = self.kinematics.n_components();
         let pieces = self.pieces(usize::MAX).into_iter();

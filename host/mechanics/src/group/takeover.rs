@@ -68,7 +68,7 @@ impl std::fmt::Display for TakeOver {
 
 impl Group {
     /// Asks a law that starts what it makes of the stresses it finds, at the same strain and time,
-    /// and makes that the committed state. `None`, and not a bit changed: they stay as they are.
+    /// and makes that the committed state. `None`, and not a bit changed: they stay the same.
     ///
     /// Laws whose stress is linear in the strain are not asked, nor are points without stress unless the
     /// case gives internal variables to start from.

@@ -9,7 +9,7 @@ const DIFFERENCES: [f64; 4] = [1e-2, 1e-3, 1e-4, 1e-6];
 /// across a branch of the law are.
 const WRONG: f64 = 0.1;
 
-/// What is wrong with a law's tangent at a point.
+/// Defect of a law's tangent at a point.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fault {
     /// The tangent is not the derivative of the law's stress: difference, relative to the largest
@@ -49,8 +49,7 @@ impl std::fmt::Display for Fault {
 }
 
 impl Group {
-    /// What is wrong with the law's tangent at a point, from its last start to its last end, if
-    /// anything is.
+    /// Defect of the law's tangent at a point, if any, from its last start to its last end.
     pub fn tangent_fault(&self, point: usize, time: f64, time_increment: f64) -> Option<Fault> {
         let law = &self.law.built.law;
         let n = law.n_components();
@@ -132,8 +131,8 @@ fn off_onward(matrix: &[f64], onward: &[f64], slopes: &[Vec<f64>]) -> Option<f64
     (least.is_finite() && least > WRONG).then_some(least)
 }
 
-/// The worst entry of a tangent beside slopes of the stress and its place; or, where it is right
-/// and no stress opposes its own strain, the smallest slope, its component, and `n`.
+/// The worst entry of a tangent compared with slopes of the stress, and its place; or, if it is
+/// right and no stress opposes its own strain, the smallest slope, its component, and `n`.
 fn fault(n: usize, matrix: &[f64], slopes: &[f64]) -> Option<(f64, [usize; 2])> {
     let known = |at: &usize| slopes[*at].is_finite();
     let largest = (0..n * n).filter(known).fold(0.0_f64, |m, at| {

@@ -6,11 +6,11 @@ use law::{End, Operator, Start, Strided};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Slip that a bond is tried with, m, and a trace of opening beside it.
+/// Slip that a bond is tried with, and a trace of opening, m.
 const SLIP: f64 = 1e-9;
 const TRACE: f64 = 1e-12;
 
-/// What is known of an interface's bond.
+/// State of an interface's bond.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Bond {
     /// Kept by a normal stress or a tensile strength, or none; or what has become of it has been said.

@@ -1,4 +1,4 @@
-//! Parameters that vary with the height: each element has a law of its own.
+//! Parameters that vary with the height: each element has its own law.
 
 use crate::element::Kinematics;
 use crate::problem::Material;

@@ -8,7 +8,7 @@
 //!
 //! where G and K' are those of the law's elastic operator and ν_u is Poisson's ratio of the undrained
 //! ground. The law sees effective stresses σ'; the element carries σ' − u δ, with the tangent
-//! D + (K_w/n) δ δᵀ. Where it drains again, what is left of u goes in proportion to the phase's time, however long that is.
+//! D + (K_w/n) δ δᵀ. When it drains again, the remaining u dissipates in proportion to the phase's time, however long that is.
 
 use super::{Field, Group, PointFailure};
 use crate::element::Axes;

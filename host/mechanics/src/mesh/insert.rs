@@ -13,7 +13,7 @@ use crate::element::increase;
 use std::collections::{HashMap, HashSet};
 use std::fmt;
 
-/// Where an edge with this middle stands among the nodes of an element.
+/// Position of an edge with this middle node among the nodes of an element.
 fn edge_at(element: &Solid, middle: usize) -> Option<[usize; 3]> {
     let (nodes, edges) = (element.nodes(), element.shape().edges().iter());
     edges.copied().find(|&[_, _, at]| nodes[at] == middle)
@@ -81,7 +81,7 @@ struct Fault {
     interface: usize,
     /// Number of its edge.
     edge: usize,
-    /// What is wrong with it.
+    /// The defect.
     reason: Reason,
 }
 
@@ -115,7 +115,7 @@ pub struct Along {
 pub struct CannotInsert {
     /// Which of the lines.
     pub number: usize,
-    /// What is wrong with one of its edges; `None`: there is no such line, or it is a point.
+    /// The defect of one of its edges; `None`: there is no such line, or it is a point.
     pub reason: Option<Reason>,
     /// Middle of that edge, m.
     pub at: Option<[f64; 2]>,
@@ -312,7 +312,7 @@ impl Cuts {
         self.ends.keys().chain(self.interface.keys()).copied()
     }
 
-    /// Whether a line ends at a node and leaves it as it is. Inside the mesh there is one sector
+    /// Whether a line ends at a node and leaves it single. Inside the mesh there is one sector
     /// around its end anyway.
     fn closes(&self, node: usize, interfaces: &[Interface]) -> bool {
         let end = self.ends.get(&node);
@@ -393,7 +393,7 @@ fn sectors(node: usize, around: &[usize], elements: &[Solid], cuts: &Cuts) -> Ve
     sector
 }
 
-/// An element, and where the nodes of one of its edges stand in it.
+/// An element, and the positions of the nodes of one of its edges.
 type Side = (usize, [usize; 3]);
 
 /// The elements on the right and on the left of every edge, interface by interface.

@@ -1,6 +1,6 @@
 //! Uniform refinement: every element into four of its kind.
 //!
-//! New nodes stand on the element's own map, which takes the quadratic parts of an element onto
+//! New nodes lie on the element's own map, which takes the quadratic parts of an element onto
 //! themselves: the finer mesh has the very shape of the coarser one, curved sides included.
 
 use super::{Line, Mesh, Shape, Solid};
@@ -19,7 +19,7 @@ impl Mesh {
     /// come after them; the parts of the element `n` are the elements from `4 n` on. Lines and points
     /// keep their names. Takes time in proportion to the size of the mesh.
     ///
-    /// Zero-thickness elements are inserted afterwards: there are none in the finer mesh.
+    /// Zero-thickness elements are inserted afterwards: the finer mesh does not contain them.
     #[must_use]
     pub fn refined(&self) -> Self {
         let mut nodes = self.nodes.clone();
@@ -84,7 +84,7 @@ impl Mesh {
     }
 }
 
-/// Adds a node at `base` and these parts of the ways from there. Where all are at one coordinate, so
+/// Adds a node at `base` and these parts of the ways from there. If all are at one coordinate, so
 /// is the node, to the last bit.
 fn push(nodes: &mut Vec<[f64; 2]>, base: [f64; 2], parts: &[(f64, [f64; 2])]) -> usize {
     let at = [0, 1].map(|c| {

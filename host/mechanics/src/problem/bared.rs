@@ -16,7 +16,7 @@ struct Load<'p> {
 #[derive(Clone, Copy, PartialEq)]
 enum Stands {
     OnGround,
-    /// Some of the ground that it acts upon is not there.
+    /// Some of the ground that it acts upon is absent.
     OnNothing,
     /// There is ground on both sides.
     Inside,

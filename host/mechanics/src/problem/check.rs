@@ -1,4 +1,4 @@
-//! What can be seen of a problem without its laws: references, counts, bounds, what is there in which phase.
+//! Checks of a problem without its laws: references, counts, bounds, active groups of each phase.
 
 use super::{
     Cause, Drainage, ElementGroup, Formulation, InitialStress, Item, JointFault, Key, Phase,
@@ -17,7 +17,7 @@ const APART: f64 = 1e-6;
 /// A node lies beyond the axis if its radius is less than this fraction of the mesh's longer side below 0.
 const BEYOND_AXIS: f64 = 1e-9;
 
-/// Refuses what refers to nothing, is no number, or changes what is not there.
+/// Refuses dangling references, invalid numbers, and changes of inactive parts.
 ///
 /// # Errors
 /// The first part that does not fit.
@@ -54,14 +54,14 @@ pub(crate) fn problem(problem: &Problem) -> Result<(), Refusal> {
     super::faces::check(problem)
 }
 
-/// A face of a zero-thickness element: its group, the solid beside it, its middle.
+/// A face of a zero-thickness element: its group, the adjacent solid, its middle.
 struct Face {
     interface: usize,
     solid: usize,
     middle: usize,
 }
 
-/// Refuses zero-thickness elements that are none. Returns the faces beside which a solid stands.
+/// Refuses invalid zero-thickness elements. Returns the faces with an adjacent solid.
 fn joints(problem: &Problem) -> Result<Vec<Face>, Refusal> {
     let mesh = &problem.mesh;
     let beside = beside_joints(mesh);
@@ -120,7 +120,7 @@ fn joints(problem: &Problem) -> Result<Vec<Face>, Refusal> {
     Ok(faces)
 }
 
-/// An interface of which one side is not there has nothing to hold it.
+/// An interface with an inactive side is not held.
 fn refuse_gone(
     problem: &Problem,
     number: usize,
@@ -274,7 +274,7 @@ fn check_group(number: usize, group: &ElementGroup, is_undrained: bool) -> Resul
     }
 }
 
-/// What is out of bounds in an earth pressure at rest.
+/// The value of an earth pressure at rest that is out of bounds.
 fn unlikely(ratio: &Ratio) -> Option<Cause> {
     let outside = |what, mut values: Box<dyn Iterator<Item = f64> + '_>, least: f64, bounds| {
         let value = values.find(|value| *value < least);
@@ -407,7 +407,7 @@ fn given_twice(problem: &Problem, number: usize, phase: &Phase) -> Result<(), Re
     Ok(())
 }
 
-/// Of the middles of edges, how many active elements have them.
+/// For every middle node of an edge, the number of active elements with it.
 pub(super) fn edges_there(mesh: &Mesh, active: &[bool]) -> HashMap<usize, usize> {
     let mut there = HashMap::new();
     let solids = mesh.solids.iter().filter(|solid| active[solid.group]);

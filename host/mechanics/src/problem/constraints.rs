@@ -103,7 +103,7 @@ struct Constraints<'a> {
     mesh: &'a Mesh,
     parts: Vec<Part>,
     held: HashMap<usize, Holder>,
-    /// What is prescribed where something holds, if it is not zero, m.
+    /// The displacement prescribed where a support holds, if it is not zero, m.
     values: HashMap<usize, f64>,
 }
 

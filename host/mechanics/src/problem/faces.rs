@@ -4,7 +4,7 @@ use super::check::edges_there;
 use super::{Axis, Cause, Item, Problem, Refusal};
 use std::collections::HashMap;
 
-/// What is said of a line.
+/// What is reported of a line.
 struct Said<'p> {
     what: &'static str,
     line: &'p str,
@@ -14,7 +14,7 @@ struct Said<'p> {
 }
 
 /// Refuses forces, displacements and supports of lines along which an interface is there, on whose two faces they would
-/// act alike: where they are said, or where a phase brings the interface.
+/// act alike: where they are reported, or where a phase brings the interface.
 pub(super) fn check(problem: &Problem) -> Result<(), Refusal> {
     let mesh = &problem.mesh;
     let joints = mesh.joints.iter().flat_map(|joint| {

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 pub struct Profile(Vec<[f64; 2]>);
 
 impl Profile {
-    /// Points (height, value) in rising order; `None` if there is none, one is no number, or they do not
-    /// rise.
+    /// Points (height, value) in rising order; `None` if the list is empty, holds a NaN, or does
+    /// not rise.
     pub fn new(points: Vec<[f64; 2]>) -> Option<Self> {
         let is_finite = points.iter().flatten().all(|value| value.is_finite());
         let rises = points.windows(2).all(|pair| pair[0][0] < pair[1][0]);
@@ -81,14 +81,14 @@ impl From<[f64; 4]> for InitialStress {
 /// Earth pressure at rest: σ'_v is the weight of what stands above, less the pore pressure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AtRest {
-    /// What σ'_h is of σ'_v.
+    /// Ratio or formula of σ'_h and σ'_v.
     pub ratio: Ratio,
     /// Added to σ'_v here, and on the same vertical in all groups below that have none of their own, kPa.
     /// `None`: what is carried down from above.
     pub surcharge: Option<f64>,
 }
 
-/// What the horizontal effective stress at rest is of the vertical one.
+/// Horizontal effective stress at rest from the vertical one.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Ratio {
     /// σ'_h = K_0 σ'_v.

@@ -1,4 +1,4 @@
-//! Which parts of a mesh move as one, and whether what is held keeps them in place.
+//! Restraint: the parts of a mesh that move as one, and whether supports hold them.
 
 use crate::mesh::Mesh;
 use std::collections::HashSet;

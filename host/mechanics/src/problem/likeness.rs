@@ -4,7 +4,7 @@ use super::{ElementGroup, Material, Phase, Problem};
 use std::fmt::{self, Write as _};
 use std::hash::{DefaultHasher, Hasher as _};
 
-/// What the states of a problem depend on, as sums that are compared within one process.
+/// Checksums of everything that the states of a problem depend on, compared within one process.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Likeness {
     mesh: u64,
@@ -23,7 +23,7 @@ pub enum Unlike {
     Whole,
     /// The number of groups, or their names.
     Groups,
-    /// A group: its law or that one's parameters, or what else is said of it.
+    /// A group: its law, the parameters of the law, or other keys.
     Group(String),
     /// A phase up to the one of the state.
     Phase(String),
@@ -45,7 +45,7 @@ impl Problem {
 }
 
 impl Likeness {
-    /// What keeps a state in a phase, by number, of a problem from being one of another; `None` if nothing does.
+    /// The first difference that keeps a state of one problem, in a phase, from being one of another; `None` if they are compatible.
     pub fn unlike(&self, other: &Self, phase: usize) -> Option<Unlike> {
         if self.mesh != other.mesh {
             return Some(Unlike::Mesh);
@@ -95,7 +95,7 @@ impl fmt::Write for Sum {
     }
 }
 
-/// What has a sum.
+/// Items with a checksum.
 trait Summed {
     fn sum(self) -> u64;
 }

@@ -10,7 +10,7 @@ use std::collections::{HashMap, HashSet};
 /// Strain beyond which geometry can no longer be taken as it was: the Green–Lagrange strain of a
 /// stretch is ε + ε²/2, so what is left out reaches ε/2, 10 % of the strain itself.
 pub(crate) const LARGE: f64 = 0.2;
-/// A water table within this part of an element's height from its edge stands at the edge.
+/// A water table within this part of an element's height from its edge counts as at the edge.
 const ROUNDED: f64 = 1e-9;
 /// Largest difference between a layer's thickness and a parameter that stands for it, as a
 /// fraction: more than what a rounded number makes.
@@ -19,7 +19,7 @@ const SAME_THICKNESS: f64 = 0.01;
 /// turn is a straight side.
 const CORNER: f64 = 170.0 / 180.0 * std::f64::consts::PI;
 
-/// What is to be said of a model before it runs. `swaps`: the groups that take another law, by
+/// Warnings about a model before it runs. `swaps`: the groups that take another law, by
 /// phase.
 pub(crate) fn warnings(
     problem: &Problem,
@@ -162,7 +162,7 @@ fn light(problem: &Problem) -> Vec<String> {
     light.collect()
 }
 
-/// What is said of ground and has no effect.
+/// What is reported of ground and has no effect.
 fn lost(problem: &Problem) -> Vec<String> {
     let mut warnings = Vec::new();
     for phase in &problem.phases {
@@ -187,7 +187,7 @@ fn lost(problem: &Problem) -> Vec<String> {
     warnings
 }
 
-/// Interfaces beside undrained ground: their tractions are effective towards the hydrostatic pressure alone.
+/// Interfaces next to undrained ground: their tractions are effective towards the hydrostatic pressure alone.
 fn beside_undrained(problem: &Problem) -> Vec<String> {
     let mesh = &problem.mesh;
     let is_undrained = |number: usize| {
@@ -284,7 +284,7 @@ fn means_thickness(parameter: &ParameterDescription) -> bool {
     parameter.unit == "m" && says_so()
 }
 
-/// A law that is told of another thickness than the elements have.
+/// A law whose thickness differs from that of the elements.
 fn other_thickness(group: &Group, law: &Material) -> Option<String> {
     let built = &law.built;
     if built.law.n_components() != 2 {

@@ -11,7 +11,7 @@ pub enum Item {
     Problem,
     /// A group.
     Group(usize),
-    /// What is said of a group under this key.
+    /// The value of this key of a group.
     GroupKey(usize, Key),
     /// The law of a group: its own, or that of a phase.
     LawOf {
@@ -57,10 +57,10 @@ pub enum Item {
     Water(Option<usize>),
 }
 
-/// What is said of a group.
+/// A key of a group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Key {
-    /// Where the law is evaluated.
+    /// The integration points.
     Integration,
     /// Direction across a layer.
     Normal,
@@ -91,7 +91,7 @@ impl Refusal {
     }
 }
 
-/// What is wrong with a zero-thickness element.
+/// Defect of a zero-thickness element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum JointFault {
     /// Its ends are one.
@@ -187,7 +187,7 @@ pub enum Cause {
     NoComponents {
         /// The line.
         line: String,
-        /// Of a displacement that is freed.
+        /// A displacement that is freed.
         is_free: bool,
     },
     /// A displacement is freed that nothing holds, in this direction.
@@ -244,19 +244,19 @@ pub enum Cause {
         group: String,
         /// Where.
         at: [f64; 2],
-        /// What is wrong with it.
+        /// The defect.
         fault: JointFault,
     },
     /// An interface is there and the ground on one of its sides is not.
     FaceGone {
         /// The interface.
         interface: String,
-        /// The group that is not there.
+        /// The inactive group.
         solid: String,
         /// Where, m.
         at: [f64; 2],
     },
-    /// A number that is none, or infinite.
+    /// A number that is NaN or infinite.
     NotFinite(&'static str),
     /// A number outside its bounds, and what they are.
     OutOfBounds(&'static str, f64, &'static str),
@@ -279,9 +279,9 @@ pub enum Cause {
     BadTime(f64),
     /// A course that does not lead from (0, 0) to time 1.
     BadCourse,
-    /// A course under arc-length control, which has a time of its own.
+    /// A course under arc-length control, which has its own time.
     CourseOfArcLength,
-    /// A phase changes the water of a problem that has none.
+    /// A phase changes the water of a problem without water.
     NoWater,
     /// Earth pressure at rest that the law cannot carry.
     AtRestOutsideStrength {
@@ -303,11 +303,11 @@ pub enum Cause {
         /// σ'_h and σ'_v there, compression positive.
         stress: [f64; 2],
     },
-    /// Water lifts what stands at rest.
+    /// Water lifts ground at rest.
     LiftedAtRest {
         /// Where.
         at: [f64; 2],
-        /// What stands above, kPa.
+        /// The overburden, kPa.
         above: f64,
         /// Pressure in the pores, kPa.
         pore: f64,

@@ -1,7 +1,7 @@
 //! Stress with which interfaces appear in ground that carries loads.
 //!
-//! The stress beside an interface is a mean of what its neighbours' points carry. Where that is not linear,
-//! its nodal forces are not those which the faces passed on to each other while they were one. So the tractions are
+//! The stress at an interface is a mean of its neighbours' points. If that is not linear, its nodal
+//! forces differ from those which the tied faces exchanged. So the tractions are
 //! changed, as little as can be, until they are: min Σ w |Δt|² with Bᵀ w Δt = r, for the points' weights w and
 //! what the nodes lack of balance r. Then nothing moves when the interface appears.
 

@@ -12,8 +12,8 @@ use std::collections::HashSet;
 /// strains grow without bound as elements shrink, over an area that vanishes.
 const SHARE: f64 = 0.01;
 
-/// An element moves in a way that its 2 × 2 points do not see where the strain of that is so many times
-/// what they see.
+/// An element moves in a mode that its 2 × 2 points do not see if its strain is this many times the
+/// strain at the points.
 const UNSEEN: f64 = 10.0;
 /// And at least this fraction of the largest strain of all.
 const WORTH: f64 = 0.1;
@@ -32,7 +32,7 @@ pub(super) struct Beyond {
     unseen: Option<(usize, f64, String, [f64; 2])>,
     /// Laws whose stiffness has been looked at.
     known: HashSet<String>,
-    /// What is to be said of them.
+    /// Warnings about them.
     stiffness: Vec<String>,
 }
 

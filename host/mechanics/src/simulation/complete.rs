@@ -109,7 +109,7 @@ impl Simulation {
     /// those that the domain `beside` them takes.
     ///
     /// # Errors
-    /// What does not balance.
+    /// The imbalance.
     fn check_balance(
         &self,
         equations: &PhaseEquations,

@@ -5,14 +5,15 @@
 use crate::equilibrium::{Reason, Singularity, StepFailure};
 use crate::settings::{Control, Settings};
 
-/// Steps by the load that may fail in a row before creep leads. What flows in a motion that sets out from a whole increment stays in the
-/// state: a pile in dilatant sand (φ = ψ = 36°) pushed by whole increments of creep carried 58 % more than by steps
-/// of the load, and what was too much fell with the length of the steps.
+/// Steps by the load that may fail in a row before creep leads. Plastic flow during a motion over a
+/// whole increment stays in the state: a pile in dilatant sand (φ = ψ = 36°), pushed by whole
+/// increments of viscous control, carried 58 % more than under load control. The excess fell with
+/// the length of the steps.
 const PATIENCE: usize = 5;
 /// Longest step by creep, as a fraction of an increment.
 pub(super) const LONGEST: f64 = 0.125;
 
-/// Shortest one, where the load may not be cut any further: creep has some cuts of its own.
+/// The shortest one if the load may not be cut any further: viscous control has its own cuts.
 const SHORTEST: f64 = LONGEST / 8.0;
 
 /// How often creep by single corrections is begun with in an increment: with the shortest step, then with the longest.
@@ -35,7 +36,7 @@ pub(super) struct Lead {
 }
 
 impl Lead {
-    /// Of an increment that begins.
+    /// For an increment that begins.
     pub(super) fn new(settings: &Settings) -> Self {
         let is_auto = settings.control == Control::Auto;
         let is_newton = settings.method.is_newton();

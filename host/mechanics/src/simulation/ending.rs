@@ -1,4 +1,4 @@
-//! What is said of a phase that cannot go on: where it is, and why.
+//! The error of a phase that cannot go on: place and cause.
 
 use super::{Simulation, UnderWay};
 use crate::equilibrium::{Reason, Runaway, StepFailure};

@@ -1,4 +1,4 @@
-//! The last steps of a phase, and what they let expect of the next one.
+//! The last steps of a phase, and the prediction of the next one.
 
 use crate::equilibrium::{Guess, StepSuccess};
 use serde::{Deserialize, Serialize};

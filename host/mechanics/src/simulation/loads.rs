@@ -130,7 +130,7 @@ impl Simulation {
         loads
     }
 
-    /// What acts when the phase has changed its loads by this factor.
+    /// Loads when the phase has changed its loads by this factor.
     pub(super) fn loading_at(&self, factor: f64) -> Loading {
         let [start, end] = &self.loading;
         if factor.to_bits() == 1.0_f64.to_bits() {
@@ -189,8 +189,8 @@ impl Simulation {
     }
 }
 
-/// Where a displacement is that has gone this part of its way: at the end to the last bit, whatever rounding makes of
-/// the difference, so that what was led to one place moves alike from there.
+/// A displacement after this part of its way. The end is exact to the last bit, whatever the
+/// rounding of the difference, so that nodes led to one place move alike from there.
 pub(super) fn part(factor: f64, start: f64, end: f64) -> f64 {
     if factor.to_bits() == 1.0_f64.to_bits() {
         end

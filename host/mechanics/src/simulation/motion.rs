@@ -2,7 +2,7 @@
 //!
 //! Motions that led to equilibrium, viscous relaxation or creep, are counted, and the first of each kind is told: where
 //! relaxation has found an equilibrium, Newton iterations from the tangent, and creep where they stand still, may find another
-//! one. Where steps are cut back, iterations choose the steps: two halves of one lead elsewhere than the whole.
+//! one. If steps are cut back, iterations choose the steps: two halves of a step end elsewhere than the whole.
 
 use super::phase::PhaseEquations;
 use super::{Simulation, UnderWay, Warning, Watch};
@@ -28,9 +28,9 @@ pub enum Neighbour {
     /// Elsewhere, by these shares of what the step changes (2-norms): of its displacement increments, and of the
     /// changes of the forces that the groups under iteration exert on the nodes.
     Apart {
-        /// Of the displacement increments.
+        /// The distance of the displacement increments.
         displacements: f64,
-        /// Of the changes of forces.
+        /// The distance of the changes of forces.
         forces: f64,
     },
     /// To no equilibrium.
@@ -82,7 +82,7 @@ impl Simulation {
         }
     }
 
-    /// Where a step leads on another way that ended in `success`, whose trial state is left as it is. `None` if it was
+    /// Where a step leads on another way that ended in `success`, whose trial state is left unchanged. `None` if it was
     /// stopped.
     fn neighbour(
         &mut self,

@@ -11,7 +11,7 @@ use crate::settings::{Control, Method, Settings};
 const MAX_STEPS: usize = 500;
 /// First step, as a fraction of what the points moved in a whole load increment.
 const FIRST: f64 = 0.25;
-/// A step is halved at most so many times.
+/// Maximum number of halvings of a step.
 const HALVINGS: i32 = 12;
 /// A step by the load has leapt where the points move faster than this, relative to the last step.
 const LEAP: f64 = 4.0;
@@ -47,7 +47,7 @@ impl Simulation {
     /// increments of 1/`n`.
     ///
     /// # Errors
-    /// Whoever watches wanted no more, or the linear groups are not in equilibrium.
+    /// The observer stopped the run, or the linear groups are not in equilibrium.
     pub(super) fn follow_path(
         &mut self,
         place: &Place,

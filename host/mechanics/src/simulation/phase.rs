@@ -109,8 +109,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// What ties leave between displacements that follow and those that they follow: nothing where they
-    /// have always done so.
+    /// Difference between tied displacements and those that they follow: zero if they were always
+    /// tied.
     fn offsets(&self) -> Vec<f64> {
         let offset = |tie: &crate::assembly::Tie| {
             if self.ties.contains(tie) {
@@ -396,7 +396,7 @@ impl Simulation {
         Ok((system, None, solver?))
     }
 
-    /// What makes a solver for equations, with the block of a domain beside them if there is one.
+    /// Makes a solver for equations, with the block of a condensed domain if there is one.
     fn solver(
         &self,
     ) -> impl Fn(&System, Option<Block>) -> Result<LinearSolver, Singular> + Sync + use<'_> {

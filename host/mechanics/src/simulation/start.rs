@@ -13,7 +13,7 @@ use crate::problem::{Cause, Formulation, InitialStress, Item, Key, Refusal};
 use abi::status::Outcome;
 use law::Moment;
 
-/// A point of an interface is taken this far towards the middle of the element beside it, as a fraction of the way:
+/// A point of an interface is moved this far towards the middle of the adjacent element, as a fraction of the way:
 /// where it reaches the surface of the ground, rounding does not decide whether it is compressed.
 const INSIDE: f64 = 1e-11;
 /// Change of stress, relative to the largest of its group and of all groups, that is worth a word.
@@ -126,7 +126,7 @@ impl Simulation {
         Ok(prescribed)
     }
 
-    /// Stress with which a group appears: none in solids; in interfaces that computed beside them, in
+    /// Stress with which a group appears: none in solids; in interfaces that computed next to them, in
     /// axes of the elements, and what exact integration adds to it. Water between the faces carries its own pressure.
     fn stress_beside(&self, number: usize) -> [Vec<f64>; 2] {
         let group = &self.groups[number];
@@ -199,7 +199,7 @@ impl Simulation {
     }
 
     /// Takes over what the law of a group, which starts now, makes of the stresses it finds, and
-    /// says how much that is. What it leaves out of balance is carried in the phase's course.
+    /// says how much that is. Its forces out of balance are carried over the phase.
     ///
     /// A law that cannot be led through a nil increment is left as it is: it returns the stresses
     /// at the first increment.

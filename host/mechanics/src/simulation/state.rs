@@ -33,7 +33,7 @@ pub struct State<'s> {
     course: Cow<'s, PhaseCourse>,
 }
 
-/// Where a phase stands.
+/// Progress of a phase.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct PhaseCourse {
     /// Loads of the phase.
@@ -46,7 +46,7 @@ pub(super) struct PhaseCourse {
     pub(super) step: f64,
     /// The last steps.
     pub(super) history: History,
-    /// Where the linear domain stands.
+    /// State of the condensed domain.
     pub(super) domain: Option<Standing>,
     /// A matrix of the groups' tangents is in use.
     pub(super) has_matrix: bool,
@@ -54,11 +54,11 @@ pub(super) struct PhaseCourse {
     pub(super) largest: f64,
     /// The phase so far.
     pub(super) record: PhaseRecord,
-    /// Which leg of the phase's course it is on.
+    /// The current leg of the phase's course.
     pub(super) leg: usize,
     /// Prescribed displacements over the whole phase.
     pub(super) prescribed: Vec<Prescribed>,
-    /// What displacements that follow others are off theirs.
+    /// Difference between tied displacements and those that they follow.
     pub(super) offsets: Vec<f64>,
 }
 

@@ -8,7 +8,7 @@
 //! - |Σ r| ≤ √n ‖r‖ ≤ √n τ F,
 //!
 //! and for moments the same times the farthest lever. F is what is given to the step, not what the
-//! iterate makes of it. Of several bodies, each held to its own F, it is √ΣF². The sums are those that
+//! iterate makes of it. For several bodies, each with its own F, it is √ΣF². The sums are those that
 //! a user sees in the results, plus what is still carried of the forces out of balance at the start.
 
 use crate::equilibrium::{Imbalance, ROUND_OFF, STILL_SMALL};
@@ -57,7 +57,7 @@ impl Balance {
         self.lever_square = self.lever_square.max(x * x + y * y);
     }
 
-    /// What does not add up.
+    /// The sums that do not balance.
     fn complaint(&self, components: &[usize], bound: Bound) -> Option<Imbalance> {
         let n = f64::sqrt(self.n.max(1) as f64);
         // Stresses of a domain follow from displacements since the start of the phase, whose last
@@ -96,7 +96,7 @@ impl Balance {
     }
 }
 
-/// What is to be balanced.
+/// The forces to be balanced.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Model<'m> {
     pub(super) analysis: Analysis,
@@ -105,7 +105,7 @@ pub(super) struct Model<'m> {
     pub(super) turns_freely: bool,
 }
 
-/// What does not balance: internal forces at supports, loads at the unknowns.
+/// The imbalance: internal forces at supports, loads at the unknowns.
 pub(super) fn complaint(
     model: Model<'_>,
     supports: impl Iterator<Item = (usize, f64)>,

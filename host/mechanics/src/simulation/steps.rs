@@ -234,8 +234,7 @@ impl Simulation {
         Ok(())
     }
 
-    /// Takes over a step that reached equilibrium at load factor λ, with all that is to be said of
-    /// it.
+    /// Takes over a step that reached equilibrium at load factor λ, with its warnings.
     pub(super) fn take_over(
         &mut self,
         success: StepSuccess,

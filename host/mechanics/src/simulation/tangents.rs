@@ -1,4 +1,4 @@
-//! Where the tangents of a phase's laws come from: from the laws, as long as they are the derivatives of
+//! The source of the tangents of a phase's laws: the laws, as long as they are the derivatives of
 //! their stresses, or from differences of these.
 
 use super::{Simulation, Warning, Watch};

@@ -152,7 +152,7 @@ impl Simulation {
     /// is where something prescribes them.
     ///
     /// # Errors
-    /// What moves alike is prescribed to move differently.
+    /// Tied displacements are prescribed to different values.
     pub(super) fn check_alike(&mut self) -> Result<(), Error> {
         let before = self.prescribed.clone();
         let outcome = self.follow_alike();

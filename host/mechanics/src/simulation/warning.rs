@@ -10,7 +10,7 @@ use std::fmt;
 /// Something that should be known of a simulation under way.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Warning {
-    /// What a law has to say beside its answers.
+    /// Messages of a law besides its results.
     Note(String),
     /// A phase starts out of balance, by this share of the forces in play.
     OutOfBalance(String, f64),
@@ -40,7 +40,7 @@ pub enum Warning {
         phase: String,
         /// What was asked for.
         tolerance: f64,
-        /// What is left.
+        /// The rest.
         left: f64,
     },
     /// The residual is within its tolerance, and round-off; corrections are above theirs.
@@ -58,7 +58,7 @@ pub enum Warning {
     CutBack(Place, Neighbour),
     /// Creep, which the settings ask for, did so.
     Crept(Place),
-    /// Nodes that stand apart move alike, and are prescribed to stand at one place.
+    /// Nodes that stand apart move alike, and are prescribed to be at one place.
     LedTogether {
         /// The phase.
         phase: String,
@@ -71,12 +71,12 @@ pub enum Warning {
     RelaxedOften {
         /// The phase.
         phase: String,
-        /// Relaxation in so many.
+        /// Steps with viscous relaxation.
         relaxed: usize,
-        /// Creep in so many.
+        /// Steps under viscous control.
         crept: usize,
     },
-    /// Residuals were tolerated in so many steps of a phase.
+    /// Number of steps of a phase with tolerated residuals.
     ToleratedOften {
         /// The phase.
         phase: String,
@@ -99,7 +99,7 @@ pub enum Warning {
         /// The tolerance.
         tolerance: f64,
     },
-    /// The residual alone decided in so many steps of a phase.
+    /// Number of steps of a phase in which the residual alone decided.
     ByForce {
         /// The phase.
         phase: String,

@@ -40,9 +40,9 @@ pub enum When<'w> {
 /// A part of a model that is looked at; the rest of a linear domain may stay where it was.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Part {
-    /// Of every group, whether its stresses and strains are.
+    /// For every group, whether its stresses and strains are.
     pub groups: Vec<bool>,
-    /// Of every group, the elements whose stresses and strains are beside, ascending.
+    /// For every group, the other elements whose stresses and strains are, ascending.
     pub elements: Vec<Vec<usize>>,
     /// Degrees of freedom whose displacements are.
     pub dofs: Vec<usize>,
@@ -51,7 +51,7 @@ pub struct Part {
 /// Whoever follows a simulation. What answers with [`ControlFlow::Break`] ends it with
 /// [`Error::Halted`](crate::Error::Halted), after the last state of equilibrium was handed out.
 pub trait Watch {
-    /// A phase begins, of so many increments.
+    /// A phase begins, with this number of increments.
     fn phase(&mut self, _name: &str, _increments: usize) {}
 
     /// An attempt at a step up to a load factor of the phase came to its end, with equilibrium or
@@ -128,8 +128,7 @@ pub trait Watch {
         ControlFlow::Continue(())
     }
 
-    /// Who may want the simulation to stop: after the increment under way, or within it if that
-    /// takes long.
+    /// A request to stop: after the current increment, or within it if that takes long.
     fn stop(&self) -> Stop {
         Stop::never()
     }

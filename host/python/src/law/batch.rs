@@ -8,7 +8,7 @@ use law::{Site, Strided};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 
-/// Whether there is memory for so many points with so many values.
+/// Whether there is memory for this many points with this many values.
 ///
 /// # Errors
 /// `MemoryError` if not.

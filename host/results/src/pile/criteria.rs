@@ -29,7 +29,7 @@ pub(crate) struct OfPhase {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Curve(Vec<OfPhase>);
 
-/// A resistance, or why there is none.
+/// A resistance, or why none exists.
 type Found = Result<f64, String>;
 
 /// The resistances of a pile, loads of its head in kN.
@@ -204,7 +204,7 @@ impl Resistances {
     }
 }
 
-/// Where a curve first comes to nothing, between two of its points: values there.
+/// First zero of a curve, between two of its points: values there.
 fn crossing(points: &[[f64; 4]], left: impl Fn(&[f64; 4]) -> f64) -> Option<[f64; 4]> {
     let pair = points
         .windows(2)

@@ -1,4 +1,4 @@
-//! What of a mesh is the pile: its elements, the nodes of its head and base, the faces of its shaft, and
+//! The pile in a mesh: its elements, the nodes of its head and base, the faces of its shaft, and
 //! the stations along it.
 
 use super::Parts;
@@ -41,7 +41,7 @@ pub(super) struct Facet {
     pub(super) element: usize,
     /// The pile's nodes on it: two ends and the middle.
     pub(super) nodes: [usize; 3],
-    /// Of a zero-thickness element, the nodes of the ground opposite them.
+    /// For a zero-thickness element, the opposite nodes of the ground.
     pub(super) opposite: Option<[usize; 3]>,
     /// The tangential traction is positive where it holds the pile up (1) or draws it down (−1).
     pub(super) sign: f64,
@@ -49,7 +49,7 @@ pub(super) struct Facet {
     pub(super) z: [f64; 2],
     /// Area, m² over the whole turn.
     pub(super) area: f64,
-    /// Element of the pile beside it: group and number within the group.
+    /// Element of the pile next to it: group and number within the group.
     pub(super) beside: (usize, usize),
     /// Elements of one colour and group share no node.
     pub(super) colour: usize,
@@ -114,7 +114,7 @@ fn is_interface(group: &Group) -> bool {
 
 impl Geometry {
     /// # Errors
-    /// What does not fit.
+    /// The mismatch.
     pub(super) fn new(parts: &Parts, simulation: &Simulation) -> Result<Self, Misfit> {
         let problem = simulation.problem();
         let (mesh, groups) = (&problem.mesh, simulation.groups());

@@ -1,4 +1,4 @@
-//! What is plausible in a pile but seldom meant.
+//! Warnings about an implausible pile.
 
 use super::geometry::{SAME, sides};
 use super::{Base, Pile};
@@ -7,7 +7,7 @@ use mechanics::problem::{Analysis, Axis, Formulation};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 impl Pile {
-    /// What is to be said of the pile before it is loaded.
+    /// Warnings about the pile before it is loaded.
     pub fn oddities(&self, simulation: &Simulation) -> Vec<String> {
         let mut said = self.of_head(simulation);
         said.extend(self.of_shaft(simulation));
@@ -82,7 +82,7 @@ impl Pile {
         said
     }
 
-    /// Groups beside the pile that are neither its shaft nor below its base.
+    /// Groups next to the pile that are neither its shaft nor below its base.
     fn beside_shaft(&self, simulation: &Simulation) -> Vec<String> {
         let (problem, groups) = (simulation.problem(), simulation.groups());
         let nodes = &problem.mesh.nodes;
@@ -129,7 +129,7 @@ impl Pile {
         said
     }
 
-    /// In plane strain a pile that is held sideways along a line of its own, as one half of a pile is on its
+    /// In plane strain a pile that is held sideways along its own line, as one half of a pile is on its
     /// plane of symmetry.
     fn half(&self, simulation: &Simulation) -> Option<String> {
         let problem = simulation.problem();

@@ -3,8 +3,8 @@
 //! The internal nodal forces of all elements at a line inside a group cancel. Those of the elements
 //! on one side are the force that these elements receive through the line. The side is that of
 //! greater coordinates (of a closed line, the inside), so that compression is positive, as at a
-//! pile's toe: its elements stand on the side of greater z there. Sides are told edge by edge along
-//! the line, so it may be of any shape.
+//! pile's toe: its elements are on the side of greater z there. Sides are found edge by edge, so
+//! the line may have any shape.
 
 use mechanics::mesh::{Line, Mesh};
 use std::collections::{HashMap, HashSet, VecDeque};
@@ -65,7 +65,7 @@ fn of_solids(mesh: &Mesh, line: &Line, number: usize) -> Option<Section> {
 
 /// Elements of a group on the side of a line on which these edges count, `other` edges being those of the
 /// other side: with an edge on the line, or around a node of it, as triangles are. Around a node at
-/// which the line ends within the group there are no two sides: what lies beside the line counts there.
+/// which the line ends within the group there are no two sides: what lies next to the line counts there.
 fn on_the_side(
     mesh: &Mesh,
     group: usize,
@@ -158,7 +158,7 @@ fn of_joints(mesh: &Mesh, line: &Line, number: usize) -> Option<Section> {
     })
 }
 
-/// Of every edge of a line, by its middle, the end at which it starts when the line is followed
+/// For every edge of a line, by its middle, the end at which it starts when the line is followed
 /// with the side that counts on its left.
 fn starts(mesh: &Mesh, line: &Line) -> HashMap<At, At> {
     let mut edges: Vec<[usize; 3]> = Vec::new();

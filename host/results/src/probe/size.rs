@@ -8,7 +8,7 @@ use mechanics::problem::Formulation;
 use mechanics::simulation::Snapshot;
 
 /// Strains, and displacements as shares of the mesh's extent, below this are held against it: where nothing moves, all that
-/// there is of them is round-off. What counts as zero beside it is 2e-16, the last bit of a strain of one.
+/// there is of them is round-off. Relative to it, 2e-16 counts as zero, the last bit of a strain of one.
 const STILL: f64 = f64::EPSILON / 1e-8;
 
 /// The largest magnitudes in a state, by kind.
@@ -25,7 +25,7 @@ pub struct Sizes {
 }
 
 impl Sizes {
-    /// Of a whole state.
+    /// For a whole state.
     pub fn of(snapshot: &Snapshot<'_>) -> Self {
         let n_dofs = snapshot.displacement.len();
         let nodes = &snapshot.mesh.nodes;
@@ -128,7 +128,7 @@ fn largest_internal(group: &Group, id: &str) -> f64 {
     values.fold(0.0, |most, value| most.max(value.abs()))
 }
 
-/// How many times a value counts that a probe makes of so many.
+/// How many times a value counts that a probe makes of this many.
 fn stands_for(reduce: Reduce, n: usize, weights: &[f64]) -> f64 {
     match reduce {
         Reduce::Sum => n as f64,

@@ -27,7 +27,7 @@ pub(super) struct Budget {
 }
 
 impl Budget {
-    /// For each of so many runs on a page.
+    /// For each of this many runs on a page.
     pub(super) fn of(n_runs: usize) -> Self {
         let whole = Self {
             history: 400_000,
@@ -58,7 +58,7 @@ impl Budget {
         }
     }
 
-    /// Rows of a history with so many columns.
+    /// Rows of a history with this many columns.
     pub(super) fn history_rows(&self, columns: usize) -> usize {
         (self.history / columns.max(1)).clamp(2, ROWS)
     }

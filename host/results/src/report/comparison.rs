@@ -20,7 +20,7 @@ pub(super) struct Setting {
 }
 
 impl Setting {
-    /// What curves can be coloured by: numbers if all of them are, else texts.
+    /// Values for colouring curves: numbers if all are numbers, else texts.
     fn by_run(&self) -> Varied<'_> {
         let numbers: Option<Vec<f64>> = self.numbers.iter().copied().collect();
         Varied {
@@ -54,8 +54,7 @@ pub(super) fn varied(settings: &[Setting]) -> Vec<Varied<'_>> {
     varied
 }
 
-/// What many runs are of, for a title: their own title if they have one in common, else their
-/// cases.
+/// Common title of many runs: their shared title, else their cases.
 pub(super) fn subject(runs: &[Run]) -> String {
     let distinct = |of: fn(&Run) -> &str| {
         let mut found: Vec<&str> = Vec::new();

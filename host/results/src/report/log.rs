@@ -9,9 +9,9 @@ use std::io::{self, BufRead, BufReader};
 use std::path::Path;
 use text::file::open_regular;
 
-/// Of the first cut-backs there is a table.
+/// Number of cut-backs in the table.
 const IN_TABLE: usize = 100;
-/// Of increments with results that a law calls inaccurate so many are told.
+/// Number of reported increments whose results a law calls inaccurate.
 const TOLD: usize = 20;
 
 /// The convergence of a run.
@@ -151,7 +151,7 @@ impl Log {
         }
     }
 
-    /// Forgets the first attempts, so that no more than so many iterations are left, and what cut
+    /// Forgets the first attempts, so that no more than this many iterations are left, and what cut
     /// them back.
     fn forget(&mut self, most: usize) {
         let mut gone = 0;

@@ -45,7 +45,7 @@ struct Stage {
     water: Vec<[f64; 2]>,
     /// The same in words.
     water_text: String,
-    /// Of every group what it is, in words; nothing if it is not there.
+    /// For every group what it is, in words; nothing if it is absent.
     groups: Vec<String>,
 }
 
@@ -180,7 +180,7 @@ fn ends(profile: &Profile) -> (f64, f64) {
     (low, high)
 }
 
-/// What every group is from a stage on.
+/// State of every group from a stage on.
 fn groups(
     problem: &Problem,
     now: &Loading,

@@ -39,9 +39,9 @@ const RUNNING: &str = include_str!("running.html");
 const UPLOT: &str = include_str!("vendor/uPlot.iife.min.js");
 const UPLOT_STYLE: &str = include_str!("vendor/uPlot.min.css");
 const UPLOT_LICENCE: &str = include_str!("vendor/LICENSE-uPlot");
-/// Of what is noted of many runs so many lines are shown.
+/// Number of lines shown of the notes of many runs.
 const MOST_NOTES: usize = 50;
-/// So many runs are named beside a note.
+/// So many runs are named next to a note.
 const NAMED: usize = 4;
 /// Larger pictures are not copied into the page, in bytes.
 const LARGEST_PICTURE: usize = 200_000;
@@ -131,12 +131,12 @@ fn page(runs: &[Run], folder: &Path, now: Option<u64>, data: &str) -> serde_json
     })
 }
 
-/// What a page of something that is under way has in addition.
+/// Additional content of a page of a run in progress.
 pub(super) fn running(now: u64) -> String {
     RUNNING.replace("NOW", &now.to_string())
 }
 
-/// What is to be noted of many runs: every line once, with those that it is about.
+/// Notes about many runs: every line once, with its runs.
 fn common_notes(runs: &[Run]) -> Vec<String> {
     let mut notes: Vec<(String, Vec<&str>)> = Vec::new();
     for run in runs {
@@ -348,7 +348,7 @@ fn mesh_error(of_phases: &Value) -> Vec<String> {
     found.map(|found| found.words()).collect()
 }
 
-/// Criteria of a pile's resistance: name, load or why there is none. Empty without a pile.
+/// Criteria of a pile's resistance: name, load or why none exists. Empty without a pile.
 fn resistances(pile: &Value) -> Vec<(&'static str, String)> {
     let criteria = [
         (

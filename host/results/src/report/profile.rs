@@ -86,8 +86,8 @@ pub(super) struct Block {
     pub(super) values: Vec<f64>,
 }
 
-/// The increments of a table. Of too many, every second is forgotten while they are read, but
-/// for the ends of phases and those where a quantity is lowest or highest.
+/// The increments of a table. If there are too many, every second one is dropped while reading,
+/// except the ends of phases and those where a quantity is lowest or highest.
 #[derive(Debug, Default)]
 pub(super) struct Blocks {
     pub(super) kept: Vec<Block>,
@@ -135,7 +135,7 @@ impl Blocks {
         });
     }
 
-    /// Of those that are kept, where a quantity is lowest or highest.
+    /// Among those kept, the places where a quantity is lowest or highest.
     fn extreme(&self) -> Vec<bool> {
         let mut extreme = vec![false; self.kept.len()];
         for column in 0..self.width {
@@ -219,7 +219,7 @@ impl Profiles {
         }
     }
 
-    /// The increment that was begun ends, with the values of so many rows.
+    /// The increment that was begun ends, with the values of this many rows.
     pub(crate) fn end(&mut self, increment: usize, n_rows: usize, values: Vec<f64>) {
         if n_rows == 0 {
             return;
@@ -295,7 +295,7 @@ impl Profile {
         Ok(Self::of(profiles, times, notes))
     }
 
-    /// What is shown of a table. `None` if that is nothing.
+    /// Excerpt of a table. `None` if that is nothing.
     pub(super) fn of(profiles: Profiles, times: &Times, notes: &mut Vec<String>) -> Option<Self> {
         let Profiles {
             columns,
@@ -425,7 +425,7 @@ fn interfaces(points: &[Point]) -> (Vec<Interface>, Vec<usize>) {
 }
 
 /// Points of a group by position along the interface, each station's across it. If stations have
-/// different numbers of points, every point is a station of its own.
+/// different numbers of points, every point is its own station.
 fn stations(points: &[Point], members: &[usize], across: usize, length: f64) -> Vec<Vec<usize>> {
     let mut sorted = members.to_vec();
     sorted.sort_by(|&a, &b| {

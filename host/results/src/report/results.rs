@@ -29,7 +29,7 @@ pub(super) struct Run {
     pub(super) name: String,
     /// The folder.
     pub(super) folder: PathBuf,
-    /// `summary.json`, null if there is none.
+    /// `summary.json`, null if absent.
     pub(super) summary: Value,
     pub(super) history: History,
     pub(super) profile: Option<Profile>,
@@ -38,7 +38,7 @@ pub(super) struct Run {
     pub(super) log: Log,
     /// The model, of a case that was not run.
     pub(super) model: Option<Model>,
-    /// What is missing or broken.
+    /// Missing or damaged files.
     pub(super) notes: Vec<String>,
 }
 

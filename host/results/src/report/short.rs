@@ -32,7 +32,7 @@ const POWERS: [f64; 45] = [
     1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1, 1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7,
     1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22,
 ];
-/// Where 1 stands among them.
+/// Position of 1 among them.
 const ONE: usize = 22;
 
 /// The power of ten of the first digit; of what is less than a last bit from a power of ten either of both.
@@ -44,7 +44,7 @@ fn exponent(size: f64) -> i32 {
     }
 }
 
-/// A number with so many digits.
+/// A number with this many digits.
 fn rounded(value: f64, digits: i32) -> f64 {
     if value == 0.0 || !value.is_finite() {
         return value;
@@ -72,7 +72,7 @@ pub(super) fn display(value: f64) -> String {
     }
 }
 
-/// Which of `n` entries to show if at most about `most` can be: evenly spaced, the first and the
+/// Entries of `n` to show if at most about `most` can be: evenly spaced, the first and the
 /// last included, and those that must be, unless they alone are too many.
 pub(super) fn thinned(n: usize, most: usize, must: impl Fn(usize) -> bool) -> Vec<usize> {
     if n <= most {
@@ -85,7 +85,7 @@ pub(super) fn thinned(n: usize, most: usize, must: impl Fn(usize) -> bool) -> Ve
         .collect()
 }
 
-/// Where columns are lowest and highest, by each of so many parts of the rows: what a curve's peaks
+/// Minima and maxima of columns, by each of this many parts of the rows: what a curve's peaks
 /// are made of. Not ascending.
 pub(super) fn extremes(columns: &[Vec<f64>], n_rows: usize, parts: usize) -> Vec<usize> {
     let length = n_rows.div_ceil(parts.max(1)).max(1);

@@ -456,7 +456,7 @@ fn in_percent(share: Option<f64>, interval: Option<[f64; 2]>) -> String {
     }
 }
 
-/// What is behind the shares of an output.
+/// Data behind the shares of an output.
 fn levels(design: Design, numbers: &[Option<f64>], parameters: usize) -> String {
     let of_scatter = "Kelley's ε², which counts what a parameter does alone and takes off what the scatter of the runs makes \
                       up by chance, with its interval of 95 % (bootstrap).";

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use text::file::open_regular;
 use text::{Error, Source};
 
-/// Of a header that cannot be used, so much is shown.
+/// Length shown of a header that cannot be used.
 const SHOWN: usize = 400;
 
 /// A CSV file that is about to be read.
@@ -72,7 +72,7 @@ impl Table {
         &self.columns
     }
 
-    /// Where a column stands.
+    /// Position of a column.
     pub(super) fn position(&self, name: &str) -> Option<usize> {
         self.columns.iter().position(|column| column == name)
     }
@@ -128,7 +128,7 @@ impl Broken {
         self.n += 1;
     }
 
-    /// What is to be said of them, if there are any.
+    /// Note about them, if any.
     pub(super) fn note(&self, file: &str, entry: &str, place: &str) -> Option<String> {
         let what = match self.n {
             0 => return None,

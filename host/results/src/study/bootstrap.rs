@@ -8,7 +8,7 @@ use crate::random::Random;
 
 /// Where the random numbers begin: the same runs have the same intervals.
 const SEED: u64 = 0;
-/// Samples: so many, fewer of many runs, whose intervals are small.
+/// Samples: this many, fewer of many runs, whose intervals are small.
 const MOST: usize = 500;
 const LEAST: usize = 100;
 const WORK: usize = 2_000_000;

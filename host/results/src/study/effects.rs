@@ -1,4 +1,4 @@
-//! What each parameter does to a number: its means at several levels of the parameter, over all values
+//! Effect of each parameter on a number: its means at several levels of the parameter, over all values
 //! of the others.
 //!
 //! The values of a parameter are its levels if there are few, and in a grid without holes however many there are: there
@@ -25,7 +25,7 @@ use serde::Serialize;
 /// So many different values of a parameter are levels.
 const FEW: usize = 12;
 
-/// What a parameter does to a number.
+/// Effect of a parameter on a number.
 #[derive(Clone, Debug, Serialize)]
 pub struct Effect {
     /// Number of the parameter.
@@ -70,9 +70,9 @@ impl Effect {
     }
 }
 
-/// What every parameter does to a number of the runs, those first that do most. `parameters`: values by
+/// Effects of all parameters on a number of the runs, the largest first. `parameters`: values by
 /// parameter and run, texts as the number of the text; `numbers` by run, `None` where a run has none that
-/// counts. A grid with such runs is none: means at its levels are over different values of the others.
+/// counts. A grid with such runs is incomplete: means at its levels are over different values of the others.
 pub fn effects(parameters: &[Vec<f64>], numbers: &[Option<f64>], design: Design) -> Vec<Effect> {
     let is_grid = design == Design::Grid && numbers.iter().all(Option::is_some);
     let mut effects: Vec<Effect> = (0..)
@@ -116,7 +116,7 @@ fn levels_of<'r>(runs: &'r [(f64, f64)], by_value: &[&[(f64, f64)]]) -> Vec<&'r 
     levels
 }
 
-/// Of runs in the order of the parameter's values.
+/// For runs in the order of the parameter's values.
 fn effect(parameter: usize, runs: &[(f64, f64)], is_grid: bool) -> Effect {
     let n = runs.len();
     let by_value: Vec<&[(f64, f64)]> = runs

@@ -11,12 +11,12 @@ pub struct History {
     pub phases: Vec<String>,
     /// Names of the columns of numbers: probes, and before them time and increment.
     pub names: Vec<String>,
-    /// Values by column and row; `None` where there is none.
+    /// Values by column and row; `None` where absent.
     pub values: Vec<Vec<Option<f64>>>,
 }
 
 impl History {
-    /// Reads the history in the folder of a run: empty where there is none, its whole rows where the run
+    /// Reads the history in the folder of a run: empty where absent, its whole rows where the run
     /// was ended within one.
     pub fn read(folder: &Path) -> Self {
         let text = std::fs::read(folder.join("history.csv")).unwrap_or_default();

@@ -16,7 +16,7 @@ pub struct Parameter {
     pub laws: Vec<String>,
     /// Its unit.
     pub unit: String,
-    /// What it is.
+    /// Its kind.
     pub doc: String,
     /// Where the search starts.
     pub start: f64,

@@ -1,4 +1,4 @@
-//! A measured curve, and the computed one beside it.
+//! A measured curve, and the computed one next to it.
 
 /// Results along a path, in the stretches that a curve may choose from: segments of a driver, phases of a
 /// case.
@@ -19,13 +19,13 @@ pub struct Curve {
     pub y: String,
     /// Texts of the axes.
     pub labels: [String; 2],
-    /// Which stretch of the path; all of it if there is none.
+    /// Which stretch of the path; all of it if absent.
     pub(super) stretch: Option<usize>,
     /// The measured points that are compared.
     pub points: Vec<(f64, f64)>,
     /// Standard deviation of each point, as told.
     pub deviations: Vec<f64>,
-    /// Whether the file says so, or these are the usual ones.
+    /// Whether the file reports it, or these are the usual ones.
     pub is_noise_given: bool,
     /// How often squared residuals count, of the curve and its test.
     pub weight: f64,
@@ -220,7 +220,7 @@ impl Curve {
         self.weighed(&differences)
     }
 
-    /// What differences of values are as residuals: over their deviations, times the root of the weight.
+    /// Differences of values as residuals: over their deviations, times the root of the weight.
     pub(super) fn weighed(&self, differences: &[f64]) -> Vec<f64> {
         let factor = self.weight.sqrt();
         let pairs = differences.iter().zip(&self.deviations);

@@ -7,7 +7,7 @@ use crate::Error;
 use input::material::ParameterValue;
 use results::point_figure::drawable;
 
-/// Which sides of a place differences are taken from.
+/// Sides from which differences are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Sides {
     /// Both, as far as bounds and the law let.
@@ -53,7 +53,7 @@ impl Model {
     }
 
     /// Derivatives of what a test computes at all measured points: a column for each parameter, `None`
-    /// where there is none to be had.
+    /// where absent to be had.
     ///
     /// # Errors
     /// As [`Model::computed`].

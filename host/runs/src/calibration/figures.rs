@@ -138,7 +138,7 @@ fn fit(
     Ok(figures)
 }
 
-/// The profile of a parameter, beside what the covariance says and the limit of the interval.
+/// The profile of a parameter, next to what the covariance says and the limit of the interval.
 fn profile(outcome: &Outcome, parameter: usize, name: &str) -> Option<Figures> {
     let (stage, place) = outcome.places[parameter];
     let stage = &outcome.stages[stage];

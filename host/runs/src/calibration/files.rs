@@ -97,7 +97,7 @@ pub(super) fn words_of(interval: Option<Interval>) -> String {
 }
 
 impl Outcome {
-    /// Interval, or why there is none.
+    /// Interval, or why none exists.
     pub(super) fn interval_in_words(&self, parameter: usize) -> String {
         let (stage, place) = self.places[parameter];
         let stage = &self.stages[stage];
@@ -107,7 +107,7 @@ impl Outcome {
         }
     }
 
-    /// What the command shows: values, how well they are known, words, the set to paste.
+    /// Output of the command: values, intervals, notes, the set to paste.
     pub fn text(&self) -> String {
         let mut text = format!("{}\n", self.title);
         let rows = (0..self.parameters.len()).map(|i| {

@@ -11,7 +11,7 @@ use crate::Error;
 use input::calibration::Variance;
 use nalgebra::{DMatrix, DVector};
 
-/// What a fit is asked for.
+/// Task of a fit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Wish {
     pub(super) starts: usize,
@@ -32,7 +32,7 @@ pub struct Group {
     pub tests: Vec<usize>,
 }
 
-/// Where one of the starts has led to.
+/// End of the search from one of the starts.
 #[derive(Clone, Debug)]
 pub struct Landing {
     /// Where it started, all parameters of the group as the search counts them.
@@ -60,7 +60,7 @@ pub struct Optimum {
     pub is_as_good: bool,
 }
 
-/// What a stage has found.
+/// Result of a stage.
 #[derive(Clone, Debug)]
 pub struct Stage {
     /// Parameters and tests.
@@ -90,18 +90,18 @@ pub struct Stage {
     /// Quantile of Student's distribution for the level of confidence; of the normal one where the
     /// variance is given.
     pub quantile: f64,
-    /// Of each parameter, whether it lies on its lower or upper bound.
+    /// For each parameter, whether it lies on its lower or upper bound.
     pub on_bound: Vec<[bool; 2]>,
-    /// Of each parameter, the norm of its column of derivatives.
+    /// For each parameter, the norm of its column of derivatives.
     pub answers: Vec<f64>,
-    /// Of each parameter, whether the tests answer to it at all: over the whole of its range residuals change
+    /// For each parameter, whether the tests answer to it at all: over the whole of its range residuals change
     /// by more than a thousandth of the noise, and by more than derivatives are known to.
     pub seen: Vec<bool>,
-    /// Where the starts have led to.
+    /// Ends of the searches.
     pub landings: Vec<Landing>,
     /// Places where no way leads down, the best first.
     pub optima: Vec<Optimum>,
-    /// Of each parameter; empty if they are not followed.
+    /// For each parameter; empty if they are not followed.
     pub profiles: Vec<Profile>,
     /// A profile found a better place, from where the search went on.
     pub is_renewed: bool,
@@ -224,7 +224,7 @@ const LONGEST: f64 = 1.0;
 /// it starts.
 ///
 /// # Errors
-/// Stopped; a test that cannot be computed for a reason that is none of the values.
+/// Stopped; a test that cannot be computed for a reason other than the values.
 #[expect(
     clippy::too_many_lines,
     reason = "starts, then profiles that may start anew"
@@ -400,12 +400,12 @@ pub(super) fn fit(
     Ok(Some(stage))
 }
 
-/// What the tests of a group are known to.
+/// Accuracy of the tests of a group.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Exactness {
     /// Square of what residuals without weights are known to, in the mean.
     pub(super) floor: f64,
-    /// What the norm of a column of derivatives is known to, with weights.
+    /// Accuracy of the norm of a column of derivatives, with weights.
     derivatives: f64,
 }
 

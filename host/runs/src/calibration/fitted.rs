@@ -1,4 +1,4 @@
-//! What is computed with the values found, beside what was measured.
+//! Curves computed with the values found, and the measured ones.
 
 use super::curve::Curve;
 use super::fit::{Group, Stage, Wish, known_to};
@@ -11,7 +11,7 @@ use super::systematic::{Limits, Systematic};
 use crate::Error;
 use input::calibration::Variance;
 
-/// A test beside its measured points.
+/// A test next to its measured points.
 #[derive(Clone, Debug)]
 pub struct Fitted {
     /// Name.
@@ -24,7 +24,7 @@ pub struct Fitted {
     pub curves: Vec<FittedCurve>,
 }
 
-/// A curve beside its measured points.
+/// A curve next to its measured points.
 #[derive(Clone, Debug)]
 pub struct FittedCurve {
     /// What was measured.
@@ -51,7 +51,7 @@ pub struct FittedCurve {
     pub inside: Option<f64>,
 }
 
-/// What is to be said of the tests.
+/// Notes about the tests.
 #[derive(Debug, Default)]
 pub(super) struct Said {
     /// Fits that are none, and residuals that are no noise.
@@ -75,7 +75,7 @@ const LITTLE: f64 = 0.1;
 /// Sums of gradients are known to this many times what derivatives of the residuals are.
 const CANCEL: f64 = 10.0;
 
-/// All tests with the values found, those that are predicted included, and what is to be said of them.
+/// All tests with the values found, those that are predicted included, and what is to be reported of them.
 ///
 /// # Errors
 /// Stopped; a test that cannot be computed with the values found.
@@ -154,7 +154,7 @@ pub(super) fn fitted(
     Ok((all, said))
 }
 
-/// What is known of the computed values of a test, curve by curve, since their units differ.
+/// Uncertainty of the computed values of a test, curve by curve, since their units differ.
 fn known(
     model: &Model,
     number: usize,

@@ -1,4 +1,4 @@
-//! Computations that are done, kept beside the results: a calibration that is stopped, or killed, goes on from
+//! Computations that are done, kept next to the results: a calibration that is stopped, or killed, goes on from
 //! them.
 //!
 //! The search takes the same way every time. So nothing of the search itself is kept, but what each
@@ -27,7 +27,7 @@ pub(super) struct Key {
     pub(super) by: Vec<usize>,
 }
 
-/// A column of values for each parameter, one of values; or why there are none.
+/// A column of values for each parameter, one of values; or why none exist.
 pub(super) type Columns = Result<Vec<Vec<f64>>, String>;
 
 /// First line: what must be the same.

@@ -9,7 +9,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// What is fitted. `Error` ends the work; `None` says that there is no answer at this place.
+/// The function that is fitted. `Error` ends the work; `None` says that there is no answer at this place.
 pub(super) trait Problem {
     /// Why the work cannot go on.
     type Error;

@@ -1,4 +1,4 @@
-//! Fits that are none: residuals of the size of what was measured, and what may be the reason.
+//! Bad fits: residuals as large as the measured values, and possible reasons.
 
 use super::curve::Curve;
 use super::words::digits;
@@ -8,7 +8,7 @@ use super::words::digits;
 const BAD: f64 = 0.25;
 const RATHER_BAD: f64 = 0.1;
 const HALF: f64 = 0.5;
-/// What the noise explains is not bad.
+/// Residuals that the noise explains are not bad.
 const OF_NOISE: f64 = 3.0;
 /// Curves of opposite sign: cosine of the angle between measured and computed values.
 const OPPOSED: f64 = -0.5;

@@ -44,25 +44,25 @@ pub(super) struct Test {
     pub(super) is_predicted: bool,
     pub(super) curves: Vec<Curve>,
     pub(super) subject: Subject,
-    /// What the law's parameters are called that the free ones stand for: number, table of laws (none of a
-    /// driver), id.
+    /// Parameters of laws that the free ones represent: number, table of laws (none for a driver),
+    /// id.
     pub(super) targets: Vec<(usize, Option<String>, String)>,
-    /// What its computed values are known to, relative.
+    /// Relative accuracy of its computed values.
     pub(super) exactness: f64,
     /// Whether its derivatives last came from the rates of its law.
     pub(super) is_by_law: bool,
-    /// What its curves are at the measured points with the starting values.
+    /// Its curves at the measured points with the starting values.
     pub(super) at_start: Vec<Vec<f64>>,
 }
 
-/// What is computed.
+/// The computation.
 #[derive(Debug)]
 pub(super) enum Subject {
     Driver(Box<Driver>),
     Case(Box<Case>),
 }
 
-/// What a computation came to; or why there is no result, in words.
+/// Result of a computation, or the reason why it is missing, in words.
 pub(super) type Computed<T> = Result<T, String>;
 
 impl Model {
@@ -141,19 +141,19 @@ impl Model {
         pairs.map(|(p, u)| p.value(*u)).collect()
     }
 
-    /// What the values of some tests are known to, relative: of the one that is known worst.
+    /// Relative accuracy of the values of some tests: the worst of them.
     pub(super) fn exactness_of(&self, tests: &[usize]) -> f64 {
         let all = tests.iter().map(|&test| self.tests[test].exactness);
         all.fold(0.0, f64::max)
     }
 
-    /// What moves the values of some tests by less than this, relative to the largest, is not seen: their differences
-    /// are known to no more.
+    /// A parameter that moves the values of some tests by less than this, relative to the largest,
+    /// is not seen: their differences are not known better.
     pub(super) fn blind_in(&self, tests: &[usize]) -> f64 {
         (self.exactness_of(tests) / self.difference).max(1e-6)
     }
 
-    /// What is kept under this: of a test, with the values of those parameters that have a say in it.
+    /// Key of a stored result: the test, with the values of the parameters that influence it.
     pub(super) fn key(&self, test: usize, counted: &[f64], by: Vec<usize>) -> Key {
         let values = self.values(counted).into_iter().enumerate();
         let own = values.filter(|(parameter, _)| self.tests[test].has(*parameter));
@@ -173,8 +173,8 @@ impl Model {
         self.kept.in_folder(folder, &identity, anew)
     }
 
-    /// What all computations depend on: program, files, libraries, where curves are read off, what the
-    /// parameters stand for.
+    /// Dependencies of all computations: program, files, libraries, abscissas of the curves,
+    /// meaning of the parameters.
     fn identity(&self) -> Result<String, Error> {
         let mut text = format!(
             "pilum {}\nderivatives by values\n{:e}\n",
@@ -279,7 +279,7 @@ impl Test {
         read.any(|number| number.is_some())
     }
 
-    /// What all curves are at their measured points.
+    /// All curves at their measured points.
     ///
     /// # Errors
     /// One cannot be read off.

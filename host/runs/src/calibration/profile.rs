@@ -1,10 +1,10 @@
-//! The profile of a parameter: the least sum of squares for values beside the best one.
+//! The profile of a parameter: the least sum of squares for values next to the best one.
 
 use super::fit::Stage;
 use super::model::Model;
 use crate::Error;
 
-/// The least sum of squares for values of one parameter beside the best.
+/// The least sum of squares for values of one parameter next to the best.
 #[derive(Clone, Debug, Default)]
 pub struct Profile {
     /// Values of the parameter, as the search counts it, ascending, with the sum of squares of the best of
@@ -32,7 +32,7 @@ pub enum Side {
     Unknown,
 }
 
-/// A profile is followed for at most so many points on either side.
+/// A profile is followed for at most this many points on either side.
 const MOST_POINTS: usize = 16;
 /// Steps of a profile, in quantiles.
 const STEP: f64 = 0.4;

@@ -1,14 +1,14 @@
-//! What the scatter of measured values makes of all parameters, and of what is computed with them.
+//! Propagation of the scatter of measured values to parameters and predictions.
 //!
 //! To first order the error of the parameters is linear in the errors η of the measured values, in units of
 //! their noise: δu = L η. A stage that fits u_f while u_h of earlier stages are held has the residuals
 //! −√w η + J_f δu_f + J_h δu_h, so that δu_f = −A⁻¹ J_fᵀ (−√w η + J_h δu_h). That carries the errors of each
 //! stage into the next ones, those of a measured value that several stages are fitted to as one and the same
-//! error. What a stage does not determine is a direction z along which its parameters may be anywhere; later stages
+//! error. An undetermined direction z of a stage leaves its parameters free along it; later stages
 //! follow it, δu_f = −A⁻¹ J_fᵀ J_h z_h.
 //!
-//! What is computed with the parameters changes by g = ∂y/∂u: its variance is s² |gᵀL|², and there is none
-//! where gᵀz is not 0.
+//! A computed value changes by g = ∂y/∂u: its variance is s² |gᵀL|², and is unbounded where gᵀz is
+//! not 0.
 
 use super::fit::Stage;
 use super::model::Model;
@@ -26,7 +26,7 @@ pub(super) struct Errors {
     first: Vec<usize>,
 }
 
-/// What is known of a computed value.
+/// Uncertainty of a computed value.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Known {
     /// Its variance, over that of the residuals.
@@ -36,7 +36,7 @@ pub(super) enum Known {
 }
 
 impl Errors {
-    /// Of parameters that nothing was fitted to.
+    /// Directions of parameters that were not fitted.
     pub(super) fn new(model: &Model) -> Self {
         let mut n = 0;
         let first = model.tests.iter().map(|test| {
@@ -119,7 +119,7 @@ impl Errors {
         Ok(())
     }
 
-    /// Derivatives of a stage's residuals by parameters that it holds; `None` where there are none to be
+    /// Derivatives of a stage's residuals by parameters that it holds; `None` where absent to be
     /// had.
     fn by_held(
         model: &mut Model,

@@ -1,8 +1,9 @@
 //! Derivatives of a driver's rows by parameters, from the rates that a law gives (contract, "Rates").
 //!
-//! What ends one increment starts the next: with the rates of its start an increment has those of its
-//! end, but for the gradient that the point was searched for. Where a flux is led, its rate is known
-//! instead, so that the gradient's follows from a small linear system of the law's own derivatives.
+//! The end of one increment starts the next: with the rates of its start an increment has those of its
+//! end, but for the gradient that the point was searched for. If a flux is prescribed, its rate is
+//! known instead, so that the gradient's follows from a small linear system of the law's own
+//! derivatives.
 
 use abi::raw;
 use input::Driver;
@@ -271,7 +272,7 @@ fn by_gradient(
     (rates.len() == n).then_some(rates)
 }
 
-/// What is known of a component's rates at the end of an increment.
+/// Known rates of a component at the end of an increment.
 #[derive(Clone, Copy, Debug)]
 enum Goal {
     /// That of the gradient.

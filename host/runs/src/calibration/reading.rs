@@ -20,7 +20,7 @@ use toml::Spanned;
 
 /// Step of differences of drivers, whose results are known to many digits.
 const STEP_OF_DRIVERS: f64 = 1e-4;
-/// What results of drivers are known to.
+/// Accuracy of results of drivers.
 const EXACTNESS_OF_DRIVERS: f64 = 1e-9;
 /// A parameter that may come as near to 0 as it likes is at least this part of its start.
 const NEAREST_TO_ZERO: f64 = 1e-9;
@@ -815,7 +815,7 @@ fn curves(
     input.curve.iter().map(curve).collect()
 }
 
-/// Part of the largest value that counts as noise where nothing is said.
+/// Part of the largest value that counts as noise where nothing is reported.
 const USUAL_NOISE: f64 = 0.01;
 
 fn deviations(

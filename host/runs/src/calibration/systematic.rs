@@ -1,6 +1,6 @@
 //! Residuals that are no noise: too far off for it, or following each other.
 //!
-//! Of all calibrations whose residuals are normal noise, at most one in a hundred is said to have residuals too far off,
+//! For all calibrations whose residuals are normal noise, at most one in a hundred is reported to have residuals too far off,
 //! and one in a hundred to have some that follow each other: each of these tests has its part of that level, divided by
 //! the points or curves that it is applied to (Bonferroni).
 //!
@@ -18,12 +18,12 @@ use super::statistics::{of_neighbours, two_sided};
 use super::words::digits;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// One calibration in so many.
+/// One calibration in this many.
 const LEVEL: f64 = 0.01;
 /// Least number of points of a curve whose scatter is estimated, and whose order tells something.
 const ENOUGH_FOR_SCATTER: usize = 15;
 const ENOUGH_IN_ORDER: usize = 10;
-/// Most points that are taken away: one in so many.
+/// Most points that are taken away: one in this many.
 const AWAY: usize = 4;
 /// Residuals smaller than this part of the noise are the last digits of measured values.
 const DIGITS: f64 = 1e-3;
@@ -117,7 +117,7 @@ impl Systematic {
         }
     }
 
-    /// What is to be said of it.
+    /// What is to be reported of it.
     pub(super) fn in_words(&self, test: &str, fitted: &FittedCurve) -> Vec<String> {
         let mut words = Vec::new();
         let Curve { x, y, points, .. } = &fitted.curve;

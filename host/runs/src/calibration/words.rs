@@ -1,4 +1,4 @@
-//! What a calibration has to say in words: what the tests do not tell, and why.
+//! Notes of a calibration: undetermined parameters and the reasons.
 
 use super::coordinates::Parameter;
 use super::curve::Rows;
@@ -11,14 +11,14 @@ use super::propagation::Errors;
 use crate::Error;
 use input::calibration::{Scale, Variance};
 
-/// Correlation beyond which two parameters are said to be told together only.
+/// Correlation beyond which two parameters are reported to be told together only.
 const CORRELATED: f64 = 0.95;
 /// An interval that is wider than this factor, or than this part of the value, is wide.
 const WIDE_FACTOR: f64 = 4.0;
 /// Part of a direction below which a parameter is not named.
 const PART: f64 = 0.1;
 
-/// What is to be said of a stage, the most important first.
+/// Notes of a stage, the most important first.
 ///
 /// # Errors
 /// Stopped.
@@ -229,7 +229,7 @@ pub(super) fn of_stage(
 /// Ratio of two standard errors that is worth a word.
 const WIDER: f64 = 1.1;
 
-/// What is to be said where parameters of earlier stages are held: how much of their errors goes into those
+/// What is to be reported where parameters of earlier stages are held: how much of their errors goes into those
 /// of later ones.
 pub(super) fn of_stages(
     model: &Model,
@@ -513,7 +513,7 @@ fn changes(here: &Rows, there: &Rows) -> Vec<String> {
         .collect()
 }
 
-/// What the paths of all tests have in common and might be why nothing answers.
+/// Common features of the paths of all tests that may explain why no curve responds.
 fn facts(model: &Model, tests: &[(usize, Rows)]) -> Vec<String> {
     let mut facts = Vec::new();
     let drivers: Vec<&Rows> = tests

@@ -1,4 +1,4 @@
-//! All runs of a study, so many at a time, each in a process of its own.
+//! All runs of a study, this many at a time, each in a separate process.
 
 use super::one::{COORDINATOR, one_line};
 use super::{Plan, folder_of_run, is_wanted};
@@ -14,7 +14,7 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How often the table of runs is written anew at most.
+/// How often the table of runs is written again at most.
 const TABLE_EVERY: Duration = Duration::from_secs(1);
 /// How often a request to stop is looked for.
 const PAUSE: Duration = Duration::from_millis(20);
@@ -30,14 +30,14 @@ pub struct Jobs {
     pub retry: bool,
     /// All of them, whatever was done before.
     pub anew: bool,
-    /// What each process is told on its command line, beside the run.
+    /// Arguments of each process besides the run.
     pub arguments: Vec<OsString>,
 }
 
 /// How a study goes.
 #[derive(Clone, Debug)]
 pub enum Event {
-    /// There are so many runs in all, so many of which are left to be carried out.
+    /// There are this many runs in all, this many of which are left to be carried out.
     Planned {
         /// In all.
         of: usize,

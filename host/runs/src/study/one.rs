@@ -1,4 +1,4 @@
-//! One run of a study, in a process of its own.
+//! One run of a study, in a separate process.
 
 use super::{Plan, folder_of_run, is_wanted, other_file, other_run};
 use crate::run::{Observer, Options, ready};
@@ -80,7 +80,7 @@ pub struct Once {
 /// was anything to do.
 ///
 /// # Errors
-/// There is no such run; another process carries it out; what the run ended with, which then stands in
+/// There is no such run; another process carries it out; what the run ended with, which then is in
 /// its folder, too.
 pub fn run_one(
     plan: &Plan,
@@ -224,7 +224,7 @@ fn wait_for_table(folder: &Path) -> Result<std::fs::File, Error> {
     }
 }
 
-/// Notes in the table how far a run has come. The folder says so, too: a table that another process holds
+/// Notes in the table how far a run has come. The folder reports it, too: a table that another process holds
 /// is left to that.
 fn note(plan: &Plan, index: usize, standing: &Standing) -> Result<(), Error> {
     let since = Instant::now();

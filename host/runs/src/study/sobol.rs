@@ -1,12 +1,12 @@
-//! The points of Sobol': a sequence that fills the unit cube evenly. Of the first 2^k points each
-//! coordinate has one in each of 2^k equal parts, and many boxes of several coordinates hold as many
+//! The points of Sobol': a sequence that fills the unit cube evenly. Each of 2^k equal parts of a
+//! coordinate holds one of the first 2^k points, and many boxes of several coordinates hold as many
 //! points as is their due.
 //!
 //! Direction numbers: `new-joe-kuo-6.21201` of S. Joe & F. Y. Kuo, "Constructing Sobol sequences with better
 //! two-dimensional projections", SIAM J. Sci. Comput. 30, 2635–2654 (2008). Order of the points: the Gray
 //! code of I. A. Antonov & V. M. Saleev (1979), in which they are published.
 
-/// Of every dimension behind the first: degree of the primitive polynomial, its inner coefficients as the
+/// For every dimension behind the first: degree of the primitive polynomial, its inner coefficients as the
 /// bits of a number, initial direction numbers.
 const DIRECTIONS: [(u32, u32, &[u32]); 30] = [
     (1, 0, &[1]),
@@ -70,7 +70,7 @@ fn directions(dimension: usize) -> [u32; DIGITS] {
 }
 
 /// One coordinate of the first `n` points, from the origin on, with the digits of `shift` exchanged in all of them: a
-/// random digital shift, which keeps them as even as they are, and takes them away from the corner of all least values
+/// random digital shift, which keeps them as even unchanged, and takes them away from the corner of all least values
 /// (P. L'Ecuyer & C. Lemieux, "Recent advances in randomized quasi-Monte Carlo methods", in: Modeling uncertainty,
 /// Kluwer 2002, 419–474).
 pub(super) fn coordinate(dimension: usize, n: usize, shift: u32) -> Vec<f64> {
@@ -122,7 +122,7 @@ mod tests {
         }
     }
 
-    /// Of the first 2^k points one lies in each of 2^k equal parts, in every dimension, shifted or not.
+    /// One of the first 2^k points lies in each of 2^k equal parts, in every dimension, shifted or not.
     #[test]
     fn each_coordinate_has_one_point_in_each_part() {
         for dimension in 0..MOST_DIMENSIONS {

@@ -38,12 +38,12 @@ pub fn end(code: u8) {
     page.set(word::ENDED, u64::from(code) + 1);
 }
 
-/// Whether laws are called in processes of their own to find out which one ended the process.
+/// Whether laws are called in separate processes to find out which one ended the process.
 pub fn is_again() -> bool {
     PAGE.get().is_some_and(|page| page.get(word::AGAIN) != 0)
 }
 
-/// Says whether laws are in processes of their own, whatever comes.
+/// Says whether laws are in separate processes, whatever comes.
 pub fn begin_run(apart: bool) {
     if let Some(page) = PAGE.get() {
         page.set(word::APART, u64::from(apart));

@@ -1,4 +1,4 @@
-//! Where processes cannot be watched, the program does all by itself.
+//! On systems without watched processes the program works in one process.
 
 use crate::Error;
 use law::Stop;

@@ -23,7 +23,7 @@ const PATIENCE: Duration = Duration::from_secs(2);
 const PAUSE: Duration = Duration::from_millis(20);
 /// How long what a law has left behind may take to end by itself.
 const LEFTOVERS: Duration = Duration::from_secs(2);
-/// What is said where nothing is watched.
+/// Warning if no process is watched.
 const UNWATCHED: &str = "the program has threads already, as by a library that was preloaded, so a law that ends the \
      process ends the program, too, and is not named";
 
@@ -35,7 +35,7 @@ struct Watch {
     signals: Signals,
 }
 
-/// What a child's end comes to.
+/// Outcome of a child's end.
 enum Verdict {
     Stands(Result<u8, Error>),
     /// A law has ended it, which is worth a second look.
@@ -52,7 +52,7 @@ struct Trouble {
 }
 
 /// Has a child carry the program out, and says how it ended. `again`: laws may be called once more in
-/// processes of their own where one has ended the child; else the outcome stands. `None`: this process is
+/// separate processes where one has ended the child; else the outcome stands. `None`: this process is
 /// to carry it out, as the child, or because none can be had here.
 pub fn supervise(again: bool, mend: &dyn Fn(&Path, &Error)) -> Option<Result<u8, Error>> {
     if !can_be_copied() {
@@ -289,7 +289,7 @@ impl Request {
     }
 }
 
-/// What is said of a child that did not stop by itself.
+/// Message about a child that did not stop by itself.
 fn stopped(calls: &[Seen]) -> Error {
     Error::StoppedAtOnce {
         during: (!calls.is_empty()).then(|| places(calls)),

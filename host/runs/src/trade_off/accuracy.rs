@@ -30,7 +30,7 @@ use table::Table;
 
 /// Share of the target for increments and tolerance where the mesh has the rest.
 const WITHOUT_MESH: f64 = 0.5;
-/// What it is called where it is said what is being done.
+/// Its name in progress messages.
 const STUDY: &str = "accuracy";
 
 /// The case with settings that reach the accuracy it asks for; `None` if it asks for none.

@@ -188,7 +188,7 @@ pub(super) fn refuse_without_probes(case: &Case, so: &str) -> Result<(), Error> 
     Ok(())
 }
 
-/// Settings that leave mesh and elements as they are, by family.
+/// Settings that leave mesh and elements unchanged, by family.
 fn settings_on_this_mesh(
     case: &Case,
     laws: &[(String, Scheme)],
@@ -272,7 +272,7 @@ struct Finest {
 }
 
 impl Finest {
-    /// Sets the scale of probes to 0 that even the finest runs disagree about, and says so.
+    /// Sets the scale of probes to 0 that even the finest runs disagree about, and reports it.
     fn leave_out_round_off(&self, scale: &mut [f64]) -> Vec<String> {
         let differences = self.coarser[1].differences(&self.rows, scale);
         let mut notes = Vec::new();
@@ -302,7 +302,7 @@ struct Cases<'a> {
     expected: Expected,
     /// Seconds of a run with the file's settings.
     unit: f64,
-    /// What is left to do, as far as it is known.
+    /// The remaining work, as far as it is known.
     left: Vec<(Settings, Timing)>,
 }
 
@@ -334,7 +334,7 @@ impl Cases<'_> {
         outcome
     }
 
-    /// What is run next, with the time that it and all others probably take.
+    /// The next run, with the predicted time of it and of all others.
     fn line(&self, settings: &Settings, timing: Timing) -> String {
         let this = (settings.clone(), timing);
         let left = self.left.iter().chain([&this]).map(|(of, timing)| {

@@ -4,7 +4,7 @@ use super::study::{Measurement, Row, Study};
 use plotters::prelude::*;
 use results::figure::COLOURS;
 
-/// Size of the diagram in points, and of the legend beside it.
+/// Size of the diagram in points, and of the legend next to it.
 const SIZE: (u32, u32) = (620, 440);
 const LINE: i32 = 17;
 /// Errors below this are drawn here.
@@ -23,7 +23,7 @@ impl Study {
     }
 }
 
-/// Where a setting stands: an error that cannot be told from 0 at the reference's uncertainty.
+/// Place of a setting: an error that cannot be distinguished from 0 lies at the uncertainty of the reference.
 fn place(study: &Study, row: &Row, measured: &Measurement) -> (f64, f64) {
     let floor = study.references[row.reference].convergence.uncertainty;
     let error = measured.error.max(floor).max(LEAST_ERROR);

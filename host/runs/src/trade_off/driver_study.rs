@@ -13,9 +13,9 @@ use law::Stop;
 const INCREMENTS: [usize; 10] = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000];
 /// The reference has this many times the largest number of increments.
 const FINER: usize = 16;
-/// Increments per segment at which schemes are told apart.
+/// Increments per segment at which schemes are compared.
 const FEW: usize = 10;
-/// What is counted.
+/// The quantity that is counted.
 pub(super) const COUNTS: &[&str] = &[ROWS, "law_calls", "cut_backs"];
 
 /// Runs the matrix. `most` bounds the increments per segment, `done` takes the study after every row.

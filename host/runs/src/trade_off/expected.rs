@@ -2,7 +2,7 @@
 
 use super::trial::{Settings, Timing, repetitions};
 
-/// A mesh of half the size of elements takes so many times as long: four times the elements, with twice the bandwidth.
+/// A mesh of half the size of elements takes this many times as long: four times the elements, with twice the bandwidth.
 const OF_A_DIVISION: i32 = 3;
 
 /// What was measured so far.

@@ -1,4 +1,4 @@
-//! Trials that are done, kept beside the results: a study that is stopped goes on from them.
+//! Trials that are done, kept next to the results: a study that is stopped goes on from them.
 //!
 //! The file has a line for the study it belongs to and one for each trial. A line that was cut off
 //! when the program was killed is a trial that is made again.
@@ -31,8 +31,8 @@ struct Head<'a> {
     study: Cow<'a, str>,
 }
 
-/// A trial. Its values are written by their bits, so that what is read is what was measured, and a
-/// value that is none stays none.
+/// A trial. Its values are written by their bits, so that values read back unchanged, and a NaN
+/// stays a NaN.
 #[derive(Serialize, Deserialize)]
 struct Line<'a> {
     settings: Cow<'a, str>,

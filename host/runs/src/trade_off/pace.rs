@@ -30,7 +30,7 @@ impl Pace {
         self.done += piece;
     }
 
-    /// What is being done, with the time that is left if it goes on at this pace.
+    /// The current activity, with the remaining time at this pace.
     pub(super) fn line(&self, doing: &str) -> String {
         let rest = (self.all - self.done) / self.done;
         if !rest.is_finite() || rest <= 0.0 {

@@ -1,7 +1,7 @@
 //! Which settings nothing else beats.
 
-/// Of (cost, error), those to which no other is at least as good in both and better in one. Of
-/// equals the first counts. Settings that failed (`None`) are never among them.
+/// Pairs (cost, error) that no other pair dominates. Among equals the first counts. Settings that
+/// failed (`None`) are never among them.
 pub(super) fn front(settings: &[Option<(f64, f64)>]) -> Vec<bool> {
     let mut order: Vec<usize> = (0..settings.len()).collect();
     order.retain(|&i| settings[i].is_some());

@@ -5,10 +5,10 @@
 pub(crate) struct Sampled {
     /// Names of the values.
     pub(crate) names: Vec<String>,
-    /// Values by stretch (segment or phase) and increment; NaN where there is none.
+    /// Values by stretch (segment or phase) and increment; NaN where absent.
     pub(crate) stretches: Vec<Vec<Vec<f64>>>,
-    /// Of every value the magnitude up to which it is zero, but for what round-off and the tolerance of equilibrium
-    /// leave; none is where there are none of these.
+    /// For every value the magnitude up to which it is zero, but for what round-off and the tolerance of equilibrium
+    /// leave; none is where absent of these.
     pub(crate) zeros: Vec<f64>,
 }
 

@@ -1,10 +1,10 @@
-//! What stiffness an interface of no thickness should have.
+//! Search for the stiffness of a zero-thickness interface.
 //!
 //! The stiffness is in the place of a penalty: too small, and the interface gives; too large, and
 //! the equations suffer. Proposed is K_n = f E_oed/h, K_t = f G/h, where E_oed, G and h are the
-//! oedometric modulus, the shear modulus and the size across of the element beside the interface,
-//! on the softer side. Which parameters of the law are stiffnesses is found by trying: those with
-//! the unit of a stiffness that scale the elastic operator.
+//! oedometric modulus, the shear modulus and the size across of the element next to the interface,
+//! on the softer side. Stiffness parameters of the law are found by trial: those with the unit of a
+//! stiffness that scale the elastic operator.
 
 use super::case_study::refuse_without_probes;
 use super::pace::Pace;
@@ -70,7 +70,7 @@ pub(super) fn run(
     Ok(())
 }
 
-/// An interface with its law in force and the elements beside it.
+/// An interface with its law in force and the elements next to it.
 struct Interface<'a> {
     group: &'a Group,
     /// Name of the law in the file.
@@ -83,7 +83,7 @@ struct Interface<'a> {
     unit: [f64; 2],
     /// h on the softer side, m.
     size: f64,
-    /// Diagonal entries of the elements beside it, by degree of freedom.
+    /// Diagonal entries of the elements next to it, by degree of freedom.
     beside: BTreeMap<usize, f64>,
 }
 
@@ -98,7 +98,7 @@ struct Tried {
 }
 
 struct Answer {
-    /// Largest elastic closure relative to the size of the element beside it.
+    /// Largest elastic closure relative to the size of the element next to it.
     penetration: f64,
     iterations: u64,
     /// Largest change of a probe since the factor before.
@@ -212,7 +212,7 @@ impl<'a> Interface<'a> {
     }
 
     /// Largest over smallest diagonal entry of the elastic stiffness of the interface and the
-    /// elements beside it.
+    /// elements next to it.
     fn conditioning(&self, [k_n, k_t]: [f64; 2]) -> f64 {
         let mut diagonal = self.beside.clone();
         let operator = [k_n, 0.0, 0.0, k_t];
@@ -380,7 +380,7 @@ fn stiffness_parameters(built: &BuiltLaw) -> Result<[(String, f64, f64); 2], Err
     }
 }
 
-/// E_oed/h, G/h and h of the element beside a joint on the side where E_oed/h is smaller.
+/// E_oed/h, G/h and h of the element next to a joint on the side where E_oed/h is smaller.
 fn softer_side(model: &Simulation, joint: &Joint) -> Option<[f64; 3]> {
     let ends = [0, 1].map(|i| model.problem().mesh.nodes[joint.minus[i]]);
     let along_x = (ends[1][0] - ends[0][0]).abs() > (ends[1][1] - ends[0][1]).abs();

@@ -1,4 +1,4 @@
-//! What a study found: settings with their errors and costs, and the references they are measured
+//! Result of a study: settings with their errors and costs, and the references they are measured
 //! against.
 
 use super::pareto::front;
@@ -16,7 +16,7 @@ pub struct Study {
     /// Names of the counts.
     pub counts: &'static [&'static str],
     /// What errors are measured against. The first holds for settings that leave the model (mesh,
-    /// elements) as it is.
+    /// elements) unchanged.
     pub references: Vec<Reference>,
     /// Settings.
     pub rows: Vec<Row>,
@@ -98,7 +98,7 @@ impl Reference {
         }
     }
 
-    /// What it is and how far it is converged, in one line.
+    /// Its name and convergence, in one line.
     pub fn statement(&self) -> String {
         let Convergence {
             difference,
@@ -164,7 +164,7 @@ impl Study {
         rows.filter_map(|row| Some((row, row.outcome.as_ref().ok()?)))
     }
 
-    /// Where the default stands, in one sentence.
+    /// Rank of the default, in one sentence.
     pub fn verdict(&self) -> String {
         let Some((row, default)) = self.measured(0).find(|(row, _)| row.is_default) else {
             return "default: no result".to_owned();

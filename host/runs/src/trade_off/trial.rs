@@ -1,4 +1,4 @@
-//! Running a case under changed settings, without output of its own.
+//! Running a case under changed settings, without output.
 
 use super::clock::cpu_seconds;
 use super::division::divide;
@@ -201,7 +201,7 @@ fn scaled(n: usize, factor: f64) -> usize {
 #[derive(Debug)]
 pub(crate) struct Scratch {
     folder: PathBuf,
-    /// Who may want what is done there to stop.
+    /// A request to stop.
     pub(crate) stop: Stop,
     /// Trials that are done.
     kept: Option<RefCell<Kept>>,
@@ -280,7 +280,7 @@ impl Scratch {
     }
 }
 
-/// What a trial is kept under.
+/// Key of a stored trial.
 fn key(settings: &Settings, round: usize) -> String {
     format!("{settings:?}, round {round}")
 }
@@ -292,7 +292,7 @@ impl Drop for Scratch {
     }
 }
 
-/// What is counted.
+/// The quantity that is counted.
 pub(super) const COUNTS: &[&str] = &["iterations", "factorisations", "law_calls", "cut_backs"];
 
 /// What came out of a trial.
@@ -304,7 +304,7 @@ pub(crate) struct Trial {
     pub(super) seconds: f64,
     /// Counts, in the order of [`COUNTS`].
     pub(super) counts: Vec<u64>,
-    /// Of every phase, whether no step took a second iteration: it is linear, and increments do not matter to it.
+    /// For every phase, whether no step took a second iteration: it is linear, and increments do not matter to it.
     pub(super) linear: Vec<bool>,
 }
 
@@ -317,12 +317,12 @@ impl Trial {
     }
 }
 
-/// A probe is zero that never exceeds this share of what its quantity has in the model: so many times the tolerance of
+/// A probe is zero that never exceeds this share of what its quantity has in the model: this many times the tolerance of
 /// equilibrium, within bounds.
 const TOLERATED: f64 = 10.0;
 const ZERO: [f64; 2] = [1e-8, 1e-6];
 
-/// Repetitions of a trial end after this many, or when they took so many seconds.
+/// Repetitions of a trial end after this many, or when they took this many seconds.
 const MOST_REPETITIONS: usize = 8;
 const LONG_ENOUGH: f64 = 0.5;
 
@@ -377,7 +377,7 @@ pub(super) fn trial(
     })
 }
 
-/// Runs a case as it is, but for its figures.
+/// Runs a case unchanged, but for its figures.
 ///
 /// # Errors
 /// Those of the run.
@@ -501,7 +501,7 @@ fn counts(summary: &Value) -> Vec<u64> {
     ]
 }
 
-/// Of every phase that ended, whether each of its increments took one iteration.
+/// For every phase that ended, whether each of its increments took one iteration.
 fn linear(summary: &Value) -> Vec<bool> {
     let phases = summary["phases"].as_array().map_or(&[][..], Vec::as_slice);
     let count = |phase: &Value, key: &str| phase[key].as_u64().unwrap_or_default();

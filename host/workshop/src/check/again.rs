@@ -13,7 +13,7 @@ use std::path::Path;
 /// Seconds that it may take.
 const PATIENCE: f64 = 60.0;
 
-/// Asks the check that has left this capsule, if it was one, of its increment: in a process of its own or,
+/// Asks the check that has left this capsule, if it was one, of its increment: in a separate process or,
 /// without isolation, in this one.
 ///
 /// # Errors

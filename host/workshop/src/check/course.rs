@@ -59,7 +59,7 @@ pub(super) fn driver_fits(subject: &Subject) -> Found {
     Ok(String::new())
 }
 
-/// Whether the law follows the author's path at all, if there is one. What it does along it is nothing else.
+/// Whether the law follows the author's path at all, if there is one. Its response along it is the only one checked.
 ///
 /// # Errors
 /// A failure, with what the law says.

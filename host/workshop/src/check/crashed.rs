@@ -1,4 +1,4 @@
-//! What a check has crashed in, found once it is over: a call, or a phase of the library.
+//! Place of the crash of a check, found after it: a call, or a phase of the library.
 
 use super::Subject;
 use crate::Error;
@@ -17,7 +17,7 @@ const ONE_BY_ONE: usize = 128;
 /// How long the process takes that reads what was kept.
 const READING: Duration = Duration::from_secs(30);
 
-/// Makes what was begun last a capsule beside its file: what it lacks is the outcome.
+/// Makes what was begun last a capsule next to its file: what it lacks is the outcome.
 ///
 /// # Errors
 /// It cannot be written.

@@ -39,7 +39,7 @@ fn with_values(specimen: &Specimen, values: &[f64]) -> Result<Option<Probe>, Ver
     Ok(created.probe.filter(|_| created.status == raw::PILUM_OK))
 }
 
-/// At most so many starts, evenly.
+/// At most this many starts, evenly.
 fn starts(steps: &[Step], most: usize) -> Vec<&Step> {
     let every = steps.len().div_ceil(most).max(1);
     steps.iter().step_by(every).collect()

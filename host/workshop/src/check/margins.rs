@@ -1,11 +1,11 @@
 //! How near to its thresholds a check has come: the largest of what was found, as a part of what is
-//! allowed. What is written into the report of a law says how much room there is.
+//! allowed. The report of a law shows the margins.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
 thread_local! {
-    /// Of the check that runs in this thread: checks are children, or one after the other.
+    /// For the check in this thread: checks are children, or run one after the other.
     static NEAREST: RefCell<BTreeMap<&'static str, f64>> = const { RefCell::new(BTreeMap::new()) };
 }
 

@@ -4,7 +4,7 @@ use super::specimen::Specimen;
 use law::probe::PointStart;
 use std::fmt::{Display, Formatter, Result};
 
-/// Most internal variables that are told; a capsule has them all.
+/// Maximum number of internal variables in a message; a capsule has them all.
 const MOST_TOLD: usize = 12;
 
 /// A point at the start of an increment, and where its gradient goes.
@@ -15,7 +15,7 @@ pub(super) struct Place<'a> {
 }
 
 impl Specimen {
-    /// Where it is asked, for messages.
+    /// Place of a call, for messages.
     pub(super) fn at<'a>(&'a self, start: &'a PointStart) -> Place<'a> {
         Place {
             specimen: self,

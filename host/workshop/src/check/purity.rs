@@ -254,7 +254,7 @@ fn independent_of_split(subject: &Subject) -> Found {
 /// Points of a batch as large as those of a run: no array of a fixed size, no stack for all of them.
 const MANY: usize = 20_011;
 
-/// The points over and over in one batch. Of each the result that differs from its first one, if any
+/// The points over and over in one batch. For each the result that differs from its first one, if any
 /// does.
 fn in_one_of_many(called: &Called<'_>, points: &[PointStart]) -> Result<Vec<PointEnd>, Verdict> {
     let many: Vec<PointStart> = points.iter().cycle().take(MANY).cloned().collect();

@@ -5,7 +5,7 @@
 pub(super) struct Random(u64);
 
 impl Random {
-    /// A generator of its own for every name.
+    /// A separate generator for every name.
     pub(super) fn new(seed: u64, name: &str) -> Self {
         // FNV-1a, so that checks do not share their numbers.
         let hash = name.bytes().fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
@@ -37,7 +37,7 @@ impl Random {
         (self.next() % n.max(1) as u64) as usize
     }
 
-    /// True once in so many times.
+    /// True once in this many times.
     pub(super) fn once_in(&mut self, times: usize) -> bool {
         self.below(times) == 0
     }

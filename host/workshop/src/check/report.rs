@@ -1,4 +1,4 @@
-//! What is told of checks: a line each, and what several have in common once.
+//! Report of checks: a line each, and common findings once.
 
 use super::{Check, Error, Family, checks};
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,5 @@
-//! What can be said of a response without knowing its equations: where it jumps, what becomes of it in
-//! smaller increments, whether its elastic operator is one.
+//! Checks of a response without its equations: jumps, convergence in smaller increments, validity
+//! of the elastic operator.
 
 use super::extent::beyond_elastic;
 use super::margins;
@@ -59,10 +59,10 @@ pub(super) const CHECKS: &[Check] = &[
 
 /// How near a tangent is to the elastic operator, relative to its largest entry.
 const NEAR: f64 = 1e-4;
-/// Length of very small increments, relative to those that change the flux by as much as it is.
+/// Length of very small increments, relative to those that change the flux by as much unchanged.
 const SMALL: f64 = 1e-6;
 
-/// At most so many steps, evenly.
+/// At most this many steps, evenly.
 fn some(steps: &[Step], most: usize) -> impl Iterator<Item = &Step> {
     steps.iter().step_by(steps.len().div_ceil(most).max(1))
 }
@@ -436,7 +436,7 @@ fn states_are_carried_on(subject: &Subject) -> Found {
     Ok(format!("{n} increments"))
 }
 
-/// What is called plastic, of an internal variable that does not change in elasticity.
+/// Names that mark an internal variable as plastic; it does not change in elasticity.
 const PLASTIC: [&str; 9] = [
     "slip",
     "opening",
@@ -449,7 +449,7 @@ const PLASTIC: [&str; 9] = [
     "multiplier",
 ];
 
-/// Whether an internal variable is plastic by its id, or by its sentence, and nothing beside.
+/// Whether an internal variable is plastic by its id, or by its sentence, and nothing next to it.
 fn is_called_plastic(id: &str, doc: &str) -> bool {
     let doc = doc.to_lowercase();
     let words: Vec<&str> = doc
@@ -511,7 +511,7 @@ fn plastic_variables_rest(subject: &Subject) -> Found {
     Ok(format!("{n} elastic increments"))
 }
 
-/// Internal variables after increments that are done in so many parts; nothing where the law does not
+/// Internal variables after increments that are done in this many parts; nothing where the law does not
 /// follow.
 fn in_parts(
     specimen: &Specimen,

@@ -1,4 +1,4 @@
-//! Libraries made for other programs: does a routine do what is said of it, in a sidecar or by itself, and
+//! Libraries made for other programs: does a routine do what is reported of it, in a sidecar or by itself, and
 //! what can go wrong in it unseen?
 //!
 //! Every call goes through the adapter of a run, guard words included, in the process of the check.
@@ -126,8 +126,8 @@ pub(super) const SHARED: [&str; 3] = [
     "units-are-known",
 ];
 
-/// Those that mean the same for a routine, too, whose parameters and increments are random or far away. What
-/// they fail of a law they warn of here: public routines are often imprecise, and are of use all the same.
+/// Those that mean the same for a routine, too, whose parameters and increments are random or far
+/// away. Failures of laws are warnings here: public routines are often imprecise but useful.
 pub(super) const OF_RESPONSES: [&str; 10] = [
     "response-is-isotropic",
     "compression-is-negative",
@@ -146,9 +146,9 @@ pub(super) const GOES_FAR: &str = "routine-stays-inside";
 
 /// Increments of the random part of a path.
 const N_INCREMENTS: usize = 36;
-/// Increments that are asked for what is read beside arguments.
+/// Increments that are asked for what is read next to arguments.
 const MOST_READ: usize = 400;
-/// What a library is made for, if not for the contract. Nothing of it runs.
+/// Program that a library is made for, if not for the contract. Nothing of it runs.
 pub(super) fn adapter(path: &Path) -> Option<Adapter> {
     law::inspect::inspect(path).ok()?.adapter()
 }
@@ -178,7 +178,7 @@ pub(super) fn refuse_without_driver(path: &Path, has_driver: bool) -> Result<(),
 /// Refuses settings that the sidecar does not know, or whose values are outside its bounds.
 ///
 /// # Errors
-/// [`text::Error::Usage`]. What is wrong with the sidecar is for the checks to say.
+/// [`text::Error::Usage`]. The checks report defects of the sidecar.
 pub(super) fn refuse_settings(settings: &[(String, f64)], path: &Path) -> Result<(), Error> {
     let source = sidecar_of(path).and_then(|sidecar| Source::read(&sidecar).ok());
     let Some(Ok(law)) = source.map(|source| sidecar(&source)) else {
@@ -199,8 +199,8 @@ pub(super) fn refuse_settings(settings: &[(String, f64)], path: &Path) -> Result
     Ok(())
 }
 
-/// What a check of responses says of a routine: it is not led far if its calls take long, and a failure of
-/// a law is a warning.
+/// Response checks of a routine: short paths if its calls take long, and warnings instead of
+/// failures.
 pub(super) fn of_response(check: &Check, subject: &Subject) -> Found {
     let mut random = Random::new(subject.seed, "speed");
     let routines = subject.specimens_by_default(1, &mut random)?;

@@ -16,7 +16,7 @@ use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 use text::suggestion;
 
-/// A call of a routine that is longer than this, in the mean of so many, is a slow one.
+/// A call of a routine that is longer than this, in the mean of this many, is a slow one.
 pub(super) const LONG: Duration = Duration::from_micros(300);
 const TIMED: u32 = 8;
 /// Series of them that must all be slow.
@@ -44,7 +44,7 @@ pub(super) struct Specimen {
     pub(super) defect: OnceLock<String>,
 }
 
-/// Which function of a law is called.
+/// The function of a law that is called.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Function {
     Integrate,
@@ -95,7 +95,7 @@ pub(crate) fn create_form<'a>(
     }
 }
 
-/// Which parameters are drawn.
+/// Parameters that are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Draw {
     /// Defaults and the middle of usual ranges.
@@ -171,7 +171,7 @@ pub(super) fn draw_all(
 }
 
 impl Subject {
-    /// Every law under every hypothesis with so many sets of parameters. The first set is the
+    /// Every law under every hypothesis with this many sets of parameters. The first set is the
     /// most ordinary one that the law accepts.
     pub(super) fn specimens(
         &self,
@@ -574,7 +574,7 @@ pub(crate) fn is_success(status: raw::Status) -> bool {
     status == raw::PILUM_OK || status == raw::PILUM_OK_UNRELIABLE
 }
 
-/// Components of a smaller hypothesis as those of one with so many: the others are nought.
+/// Components of a smaller hypothesis as those of one with this many: the others are nought.
 pub(super) fn longer(values: &[f64], n: usize) -> Vec<f64> {
     let mut longer = values.to_vec();
     longer.resize(n, 0.0);

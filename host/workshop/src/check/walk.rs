@@ -38,7 +38,7 @@ pub(super) struct Step {
     pub(super) stiffness: f64,
 }
 
-/// An increment of a point that did not end well, and what was said of it or of another one beside it.
+/// An increment of a point that did not end well, and what was said of it or of another one next to it.
 #[derive(Clone, Debug)]
 pub(super) struct Refused {
     pub(super) status: raw::Status,
@@ -51,7 +51,7 @@ pub(super) struct Refused {
 pub(super) struct Walk {
     pub(super) steps: Vec<Step>,
     pub(super) refusals: Vec<Refused>,
-    /// Starts of the points that are said to have succeeded, finite or not.
+    /// Starts of the points that are reported to have succeeded, finite or not.
     pub(super) successes: Vec<PointStart>,
     /// The first increment whose results are finite and larger than any that mean something.
     pub(super) blown_up: Option<Step>,
@@ -83,14 +83,14 @@ struct Led {
     point: PointStart,
     stiffness: f64,
     size: f64,
-    /// Which component is led, which keep their flux, and the remaining ones.
+    /// The prescribed component, those that keep their flux, and the others.
     driven: usize,
     held: Vec<usize>,
     rest: Vec<usize>,
     goals: Vec<f64>,
     /// What the held ones moved by in the last increment, relative to the driven one.
     ratios: Vec<f64>,
-    /// What the remaining ones move by, little: where nothing at all moves, a law has a choice.
+    /// Small motion of the others: without any motion a law has a choice.
     drift: Vec<f64>,
     /// Length of the next increment, with its sign; what is left of this leg.
     increment: f64,
@@ -291,8 +291,8 @@ impl Specimen {
 
     /// Leads points there and back: one component ahead in increments that grow from a part of the
     /// elastic limit until the law has slid or strained a long way, others at constant flux, as in a
-    /// shear box or a triaxial cell. What a law does beyond some slip is met, whatever its stiffness,
-    /// and each way back begins with small increments, so that unloading is.
+    /// shear box or a triaxial cell. The path goes beyond some slip, whatever the stiffness, and
+    /// each way back begins with small increments to include unloading.
     fn lead(
         &self,
         walk: &mut Walk,
@@ -453,7 +453,7 @@ impl Specimen {
         Ok(())
     }
 
-    /// Starts of steps that succeed, at most so many: the last of a walk, farthest from its beginning,
+    /// Starts of steps that succeed, at most this many: the last of a walk, farthest from its beginning,
     /// and as many of points that are led there and back.
     pub(super) fn points(&self, n: usize, random: &mut Random) -> Result<Vec<PointStart>, Verdict> {
         let walk = self.walk(n.div_ceil(WALKERS) + STRAIGHT, random)?;
@@ -482,7 +482,7 @@ impl Specimen {
 }
 
 impl Walk {
-    /// Notes what became of an increment, and carries the point on. `false`: it has to begin anew.
+    /// Notes what became of an increment, and carries the point on. `false`: it has to begin again.
     fn take(&mut self, point: &mut PointStart, stiffness: f64, end: PointEnd, text: &str) -> bool {
         let success = is_success(end.status);
         let is_sound = success && is_finite(&end);

@@ -1,4 +1,4 @@
-//! What a check has done with a library where no law is called: loading, handshake, entry, description,
+//! Phases of a library without calls of a law: loading, handshake, entry, description,
 //! `destroy` of null, the end of the process.
 
 use super::probed::refusal_of;
@@ -14,9 +14,9 @@ use std::sync::Arc;
 use std::time::Duration;
 use text::file;
 
-/// What is said of a library that takes longer than it may.
+/// Message about a library that exceeds its time limit.
 const STUCK: &str = "the library does not return";
-/// What is said as soon as the library has returned; of what comes at the end, before that.
+/// Message as soon as the library has returned; for the end of the process, before that.
 const RETURNED: &str = "it returned";
 const ENDS: &str = "the process ends now";
 
@@ -73,7 +73,7 @@ pub(super) fn replay(
     )))
 }
 
-/// Does what a capsule says in a process of its own: what was said, and how the process ended if the
+/// Does what a capsule says in a separate process: what was said, and how the process ended if the
 /// library ended it.
 ///
 /// # Errors

@@ -1,4 +1,4 @@
-//! Calls as `pilum check` has made them: in a process of their own, where they may crash again, or in
+//! Calls as `pilum check` has made them: in a their own process, where they may crash again, or in
 //! this one, for a debugger.
 
 use crate::Error;
@@ -11,11 +11,11 @@ use law::{LoadedLaw, Opener, Trust};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// What is said of a law that takes longer than it may.
+/// Message about a law that exceeds its time limit.
 const STUCK: &str = "the law does not return";
-/// How long a law may take for some points in a process of their own.
+/// How long a law may take for some points in a their own process.
 const PATIENCE: Duration = Duration::from_secs(20);
-/// What is said as soon as the law has returned.
+/// Message as soon as the law has returned.
 const RETURNED: &str = "the call returned";
 
 /// Repeats the call in another process.
@@ -100,7 +100,7 @@ impl Drop for ScratchFile {
     }
 }
 
-/// Repeats the call of a capsule in a process of its own: what was said, and how the process ended if the
+/// Repeats the call of a capsule in a separate process: what was said, and how the process ended if the
 /// law ended it.
 ///
 /// # Errors
@@ -167,7 +167,7 @@ pub(crate) fn shown(end: &PointEnd) -> String {
     format!("{FLUX}{:?}, internal variables {:?}", end.flux, end.state)
 }
 
-/// What is said where nothing is wrong.
+/// Message if nothing is wrong.
 const FAULTLESS: &str = "the call succeeds";
 
 /// Repeats the call in this process, once more, and in other ways that must not matter.

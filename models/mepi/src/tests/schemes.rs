@@ -76,8 +76,8 @@ fn the_error_of_explicit_steps_falls_as_one_over_their_number() {
     }
 }
 
-/// What an increment drifts is taken back at the start of the next one, so increments are worth more
-/// than substeps.
+/// The next increment first corrects the drift of the last one, so increments are worth more than
+/// substeps.
 #[test]
 fn the_drift_does_not_accumulate_over_increments() {
     let truth = Truth::hardening(TABLE_4, 100.0);

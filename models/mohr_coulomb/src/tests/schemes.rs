@@ -118,7 +118,7 @@ fn error_control_meets_its_tolerance_in_space() {
     }
 }
 
-/// Where the axes do not turn and the zone does not change, the schemes agree to rounding, plastic
+/// If axes and zone do not change, the schemes agree to rounding, plastic
 /// strains included.
 #[test]
 fn without_turning_all_schemes_are_exact() {
@@ -186,7 +186,7 @@ fn the_tangent_is_the_continuum_one() {
 /// Every scheme ends near the surface with finite numbers. The explicit one has no reason to refuse. The
 /// other may, where two principal stresses are equal where the flow starts or ends: there the axes turn
 /// at a rate without bound, `G γ/(s_i − s_j)`, and the error of a step does not fall with its square, nor
-/// has a relative error a meaning at an apex without stress. Where the three stay apart, about
+/// has a relative error a meaning at an apex without stress. If the three stay apart, about
 /// `√(‖σ''‖/(2 ‖σ‖ ε_s))` steps suffice, far below the 10 000 that it has. So that success is no matter
 /// of chance, states are drawn until a hundred have had to succeed, fifty by each scheme at least.
 #[test]
@@ -250,7 +250,7 @@ fn are_equal(stress: &[f64; 6]) -> bool {
     (s[0] - s[1]).min(s[1] - s[2]) <= 1e-9 * s.amax()
 }
 
-/// What lies outside at the start is no error of a step: however small the steps, it would stay.
+/// A start outside the surface is no error of a step: it would stay, however small the steps.
 #[test]
 fn a_stress_from_outside_is_returned_before_the_steps() {
     let outside = [-60.0, -500.0, -60.0, 0.0];

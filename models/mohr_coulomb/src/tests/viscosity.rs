@@ -92,7 +92,7 @@ fn the_tangent_is_the_derivative() {
     }
 }
 
-/// What has flowed is what elasticity does not explain: shear and volume, Eq. (13).
+/// Plastic strain is the strain that elasticity does not explain: shear and volume, Eq. (13).
 #[test]
 fn the_plastic_strain_is_what_is_not_elastic() {
     let law = viscous(TAU);

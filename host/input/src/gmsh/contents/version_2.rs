@@ -3,7 +3,7 @@
 use super::{Element, Encoding, Fault, Kind, MOST_NODES, Reader};
 
 impl Reader<'_> {
-    /// A number of things that stands in a line of text in any encoding.
+    /// A number of things that is in a line of text in any encoding.
     fn count_in_text(&mut self, what: &str, numbers: usize, bytes: usize) -> Result<usize, Fault> {
         let cursor = &mut self.contents.cursor;
         let encoding = std::mem::replace(&mut cursor.encoding, Encoding::Text);

@@ -58,7 +58,7 @@ fn middles_are_put_in() {
     }
 }
 
-/// An element beside others of another order takes the middles that there are, straight or not.
+/// An element next to others of another order takes the middles that there are, straight or not.
 #[test]
 fn orders_may_be_mixed() {
     let (expected, _) = read(&model().write(2.2, Bytes::Text), &all()).unwrap();

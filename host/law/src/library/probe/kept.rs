@@ -13,7 +13,7 @@ static KEPT: OnceLock<Mutex<Keeper>> = OnceLock::new();
 /// Digits that tell how long the text behind them is; what is behind that is of earlier calls.
 const DIGITS: usize = 12;
 
-/// Which function of a law is called.
+/// The function of a law that is called.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Function {
@@ -27,7 +27,7 @@ pub enum Function {
     Destroy,
 }
 
-/// What runs of a library where no points are carried.
+/// Activity of a library outside calls for points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Phase {
@@ -37,7 +37,7 @@ pub enum Phase {
     Handshake,
     /// `pilum_entry` is called.
     Entry,
-    /// What that has returned is read.
+    /// Its result is read.
     Describe,
     /// `destroy` gets null.
     DestroyNull,
@@ -58,7 +58,7 @@ impl Phase {
         }
     }
 
-    /// What is done there, in words.
+    /// The activity, in words.
     pub fn words(self) -> &'static str {
         match self {
             Self::Load => "loading it",
@@ -102,7 +102,7 @@ pub enum Kept {
     Phase(KeptPhase),
 }
 
-/// Where it is written, and the call for points that was made last.
+/// The place of the record, and the last call for points.
 #[derive(Debug)]
 struct Keeper {
     file: File,

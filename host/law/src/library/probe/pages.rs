@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use std::io;
 
-/// What lies beside an array.
+/// What lies next to an array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fence {
@@ -15,7 +15,7 @@ pub enum Fence {
     Before,
 }
 
-/// Bytes in pages of their own, or, where nothing is forbidden, of the heap, which takes fewer calls of the system.
+/// Bytes in their own pages, or, where nothing is forbidden, of the heap, which takes fewer calls of the system.
 /// Without `mmap` there are no fences and no locks.
 #[derive(Debug)]
 pub(super) struct Pages {
@@ -51,7 +51,7 @@ impl Pages {
         })
     }
 
-    /// From now on writing ends the process. Bytes of the heap move to pages of their own.
+    /// From now on writing ends the process. Bytes of the heap move to their own pages.
     pub(super) fn lock(&mut self) -> io::Result<()> {
         let page = page_size();
         let inner = self.length.next_multiple_of(page).max(page);

@@ -1,6 +1,6 @@
-//! What a law may have changed of the process, or keeps of its memory, and only the system tells.
+//! Changes that a law makes to the process or its memory, as the system reports them.
 
-/// What is done on each signal, by its number, from 1.
+/// Action on each signal, by its number, from 1.
 #[cfg(target_os = "linux")]
 pub fn signal_handlers() -> Vec<usize> {
     use nix::libc;

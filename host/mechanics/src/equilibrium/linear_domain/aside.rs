@@ -1,7 +1,7 @@
 //! Unknowns that some phases of a run prescribe and others do not, such as those of a pile head that is free
 //! while the ground is confined and is then pushed down.
 //!
-//! They are kept beside the boundary in all phases: the factors of the interior serve them all. With S
+//! They are kept with the boundary in all phases: the factors of the interior serve them all. With S
 //! condensed onto boundary b, those that are prescribed now h, and those that are free now f,
 //!
 //! - S_ff Δu_f = Δλ r'_f − S_fb Δu_b − S_fh Δu_h, Δu_h = Δλ ū_h
@@ -31,7 +31,7 @@ pub struct Held<'h> {
 }
 
 impl Held<'_> {
-    /// Those of some phases only, if that pays beside the groups that are `condensed`; else none.
+    /// Those of some phases only, if that saves time with the groups that are `condensed`; else none.
     pub(super) fn kept(&self, (groups, condensed): (&[Group], &[bool])) -> Vec<bool> {
         let mut nodes = [
             vec![false; self.now.len() / 2],
@@ -68,7 +68,7 @@ impl Held<'_> {
     }
 }
 
-/// What is kept beside the boundary in one phase.
+/// The unknowns kept with the boundary in one phase.
 #[derive(Debug)]
 pub(super) struct Aside {
     /// Number of all that are kept.

@@ -11,7 +11,7 @@ use crate::equilibrium::newton::norm;
 use crate::group::{Excerpted, Group};
 use serde::{Deserialize, Serialize};
 
-/// Completing the state takes as long as bringing up their groups in so many increments.
+/// Completing the state takes as long as updating their groups in this many increments.
 const FEW: usize = 10;
 
 /// Some elements of one group.

@@ -16,7 +16,7 @@ const REFINED: f64 = 0.1;
 /// Some groups of a domain, with what gives their displacements.
 #[derive(Debug)]
 pub(super) struct Part {
-    /// Of every group of the model, whether it belongs to the part.
+    /// For every group of the model, whether it belongs to the part.
     pub(super) groups: Vec<bool>,
     /// Elements of others.
     pub(super) excerpts: Vec<Excerpt>,
@@ -230,8 +230,9 @@ impl LinearDomain {
     }
 
     /// Trial state of a part's groups in equilibrium with its goal, from a motion that corrections are added to: what is
-    /// left out of balance and had to be taken for round-off, relative, and internal forces. A correction counts from
-    /// the state that it corrects, since beside the whole motion it would be lost in rounding: then the state that was
+    /// left out of balance and had to be taken for round-off, relative, and internal forces. A
+    /// correction counts from the state that it corrects, since rounding of the whole motion would
+    /// hide it: then the state that was
     /// `committed` before is handed out.
     fn balance(
         &self,

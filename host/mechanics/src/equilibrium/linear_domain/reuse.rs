@@ -17,7 +17,7 @@ pub struct Reuse {
     known: VecDeque<Condensed>,
     /// No other run follows.
     pub is_last_run: bool,
-    /// Who is told beforehand how many bytes a large piece of work takes, and what it is.
+    /// Callback that receives, before a large piece of work, the bytes it takes and its name.
     pub announces: Option<fn(u64, &'static str)>,
     /// Nor, in the present one, another phase.
     pub(crate) is_last_phase: bool,
@@ -63,12 +63,12 @@ impl Setup {
 #[derive(Clone, Debug)]
 pub(super) struct Numbered {
     pub(super) system: Arc<System>,
-    /// Of every unknown, whether it is not eliminated: on the boundary, or kept beside it.
+    /// For every unknown, whether it is not eliminated: on the boundary, or kept with it.
     pub(super) kept: Vec<bool>,
     pub(super) factors: Arc<Multifrontal>,
     /// Largest entry of the matrix.
     pub(super) stiffest: f64,
-    /// 2-norm of its diagonal, and of what stands there for unknowns that are kept.
+    /// 2-norm of its diagonal, and of the diagonal of the kept unknowns.
     pub(super) diagonal: [f64; 2],
 }
 

@@ -3,8 +3,9 @@
 //! Two criteria, body by body: the residual relative to the forces in play, and the last correction
 //! relative to the increment of the displacements. Both references come from the iterate itself,
 //! so an iterate that runs away would widen its own tolerances: pressures of 10⁹ kPa in elements
-//! without stiffness excuse a residual of many kN, and a correction of 10¹⁰ m is small beside an
-//! increment of 10¹⁰ m. Therefore neither reference may exceed what is given by more than a factor:
+//! without stiffness excuse a residual of many kN, and a correction of 10¹⁰ m is small compared
+//! with an increment of 10¹⁰ m. Therefore neither reference may exceed what is given by more than a
+//! factor:
 //!
 //! - forces: those at the start of the phase, those of the last equilibrium, the loads, and the
 //!   forces that the step calls forth elastically,
@@ -13,7 +14,7 @@
 //! Stresses that follow a yield surface are smaller than elastic ones. Those that exceed them are
 //! raised by dilatancy against a stiff neighbour or by a stiffness that grows with pressure; a
 //! factor of ten ([`FORCES`]) leaves room for them, and costs at most one digit of what the
-//! tolerance means. Where the forces rise farther in one step, the criterion is only stricter.
+//! tolerance means. If the forces rise farther in one step, the criterion is only stricter.
 
 use super::round_off::ROUND_OFF;
 
@@ -40,12 +41,12 @@ pub(super) struct Forces {
     pub(super) last: f64,
     /// Forces that the step calls forth elastically; `None` if it has no elastic answer.
     pub(super) elastic: Option<f64>,
-    /// Where no force has ever acted, what is below counts as none.
+    /// If no force has ever acted, smaller forces count as zero.
     pub(super) floor: f64,
 }
 
 impl Forces {
-    /// What the residual is measured against.
+    /// Reference of the residual.
     pub(super) fn scale(self) -> f64 {
         let given = self.elastic.map_or(f64::INFINITY, |elastic| {
             FORCES * elastic.max(self.imposed).max(self.last)
@@ -64,7 +65,7 @@ pub(super) struct Change {
 }
 
 impl Change {
-    /// Of a correction in a step whose increment has come to `moved` where `predicted` was expected.
+    /// The criterion of a correction in a step whose increment has come to `moved` where `predicted` was expected.
     pub(super) fn of(correction: f64, moved: f64, predicted: f64) -> Self {
         let limit = if predicted > 0.0 {
             MOVES * predicted
@@ -82,7 +83,7 @@ impl Change {
     }
 }
 
-/// What is asked of a state.
+/// Criteria of a state.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Criteria {
     pub(super) force: f64,

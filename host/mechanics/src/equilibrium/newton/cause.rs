@@ -1,4 +1,4 @@
-//! What is found out about a step that found no equilibrium.
+//! Diagnosis of a step that found no equilibrium.
 
 use super::Newton;
 use super::failure::{Culprit, Iterations, Motion, Reason, StepFailure};
@@ -10,7 +10,7 @@ use crate::equilibrium::mechanism::{self, Jumps, Mechanism};
 use law::Operator;
 
 impl Newton<'_> {
-    /// A failure with all that can be said of it.
+    /// A failure with its full diagnosis.
     pub(super) fn explained(
         &mut self,
         failure: StepFailure,
@@ -38,7 +38,7 @@ impl Newton<'_> {
         }
     }
 
-    /// What is said of iterations that have come to their end.
+    /// The failure of iterations that have reached their limit.
     pub(super) fn no_equilibrium(
         &mut self,
         control: &impl Control,

@@ -16,9 +16,9 @@
 //! comes to rest. Every viscous step is solved and **its state committed**: laws see the path of a
 //! body that creeps to its equilibrium, not one increment tried again and again. Above
 //! α = (1/cos θ − 1)/2, θ the angle between yield and flow in energy, a step's matrix is positive definite
-//! and its answer the only one; where a viscous step turns out to be linear nothing yields or unloads
-//! any more, and α falls, at last to nothing: a Newton correction. The same tolerances decide. What
-//! is accepted is an equilibrium of the laws alone, without overstress.
+//! and its answer the only one; if a viscous step is linear, nothing yields or unloads any more,
+//! and α falls, finally to zero: a Newton correction. The same tolerances decide. The accepted
+//! state is an equilibrium of the laws alone, without overstress.
 
 //! Where a point breaks off what it carries a viscous step may have no answer: whole, the point opens; open, what it no longer carries
 //! moves the body so that it closes, and its law, which sees the one increment from the start of the viscous step, finds it
@@ -47,11 +47,11 @@ const FAILED: f64 = 3.0;
 const MANY: usize = 3;
 const TOO_MANY: usize = 8;
 const FEW: usize = 3;
-/// What a viscous step leaves of its own equation, relative to the residual of the laws or to the
-/// force tolerance.
+/// Residual of the equation of a viscous step, relative to the residual of the laws or to the force
+/// tolerance.
 const INNER: f64 = 0.1;
 const NEGLIGIBLE: f64 = 0.3;
-/// Where one correction was enough, α falls by the factor; if it is then below its first value, a viscous step that is
+/// If one correction was enough, α falls by the factor; if it is then below its first value, a viscous step that is
 /// not as easy is taken back.
 const FALLS: f64 = 0.3;
 /// α below this counts as none.
@@ -63,10 +63,10 @@ const IDLE: usize = 40;
 const IDLE_SINGLY: usize = 120;
 /// Lengths of a correction that are tried.
 const LENGTHS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
-/// A motion of more viscous steps lets expect another one in the next step.
+/// After a motion of more viscous steps, the next step probably needs one too.
 const SHORT: usize = 3;
 
-/// What creep has done in a step.
+/// Statistics of viscous control in a step.
 #[derive(Debug)]
 pub(super) struct Creep {
     course: Course,
@@ -82,7 +82,7 @@ enum Course {
     Off,
     /// Newton iterations have not come to a standstill yet.
     Ready,
-    /// It led to the present state, in so many viscous steps.
+    /// It led to the present state, in this many viscous steps.
     Arrived(usize),
     /// It led nowhere. Newton iterations had to go on alone.
     InVain,
@@ -114,7 +114,7 @@ struct Went {
 }
 
 impl Creep {
-    /// Of a step to a given load factor, after a motion or not.
+    /// The outcome of a step to a given load factor, after a motion or not.
     pub(super) fn new(settings: &Settings, is_expected: bool) -> Self {
         // Methods that keep their matrix are slow without having come to an end.
         let is_wanted = settings.control == Control::Creep && settings.method.is_newton();
@@ -173,7 +173,7 @@ impl Creep {
     }
 
     /// The equilibrium that a motion leads to; `None` if it leads to none: then the state is that at the
-    /// start of the step again, and Newton iterations may go on for as many as are left to them.
+    /// start of the step again, and the remaining Newton iterations may go on.
     ///
     /// # Errors
     /// The step is stopped.

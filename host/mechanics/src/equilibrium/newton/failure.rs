@@ -10,9 +10,9 @@ use serde::Serialize;
 /// A criterion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Criterion {
-    /// Of the forces out of balance.
+    /// The forces out of balance.
     Residual,
-    /// Of the last correction of the displacements.
+    /// The last correction of the displacements.
     Correction,
 }
 
@@ -89,7 +89,7 @@ pub enum Reason {
         /// There was a path before.
         any_more: bool,
     },
-    /// The non-linear groups move so many times as fast as in the last step.
+    /// The non-linear groups move this many times as fast as in the last step.
     Leap(f64),
     /// The path of equilibrium was followed, from one load factor between two others, and ended.
     Followed {
@@ -106,7 +106,7 @@ pub enum Reason {
         steps: usize,
         /// Lowest and highest load factor.
         between: [f64; 2],
-        /// Where it is.
+        /// Its place.
         at: f64,
     },
     /// The path of equilibrium led back far beyond the start of the phase.
@@ -148,7 +148,7 @@ pub enum DomainFailure {
         left: f64,
         /// What it may be.
         tolerance: f64,
-        /// What the last bit of the displacements stands for.
+        /// The effect of the last bit of the displacements.
         last_bit: f64,
     },
     /// A law failed.

@@ -1,9 +1,9 @@
-//! What is given to a step: the forces and displacements that an iterate is measured against.
+//! References of a step: the forces and displacements that an iterate is measured against.
 //!
 //! Found out when it is asked for. In ordinary steps the loads or the last equilibrium already
 //! exceed a tenth of the forces in play, and nothing more is computed. Where they do not (a start
 //! without stress, a load that grows tenfold), the step is answered elastically once: with what the iterations hold
-//! factorised, if that is the elastic matrix, else with equations of its own, so that it stays as it is.
+//! factorised, if that is the elastic matrix, else with separate equations, so that the matrix stays unchanged.
 
 use super::Newton;
 use super::acceptance::{Change, Forces, MOVES};
@@ -14,10 +14,10 @@ use crate::group::Group;
 use algebra::{LinearSolver, Singular};
 use law::Operator;
 
-/// Bytes of a factorisation that stays beside that of the iterations.
+/// Bytes of a factorisation that is kept besides that of the iterations.
 const MOST_BESIDE: u64 = 1 << 28;
 
-/// What is known of it in the present step; by body.
+/// Its value in the present step; by body.
 #[derive(Debug, Default)]
 pub(super) struct Given {
     /// Sizes of the displacement increments that the iterations start from; empty before.
@@ -26,7 +26,7 @@ pub(super) struct Given {
     from_tangent: bool,
     /// Internal forces of the last equilibrium.
     last: Option<Vec<f64>>,
-    /// The elastic answer; `Some(None)` if there is none.
+    /// The elastic answer; `Some(None)` if absent.
     #[expect(clippy::option_option, reason = "not asked for, or asked for in vain")]
     elastic: Option<Option<Elastic>>,
 }
@@ -59,8 +59,8 @@ impl Newton<'_> {
         norms(&bodies.of_place, bodies.n, by_place)
     }
 
-    /// Sizes of internal forces, by body: `internal` by place, from these stresses by group. Where
-    /// bodies have places in common, each is given what its own elements do there.
+    /// Sizes of internal forces, by body: `internal` by place, from these stresses by group. If
+    /// bodies share a place, each gets the forces of its own elements there.
     pub(super) fn forces_by_body(
         &mut self,
         internal: &[f64],
@@ -115,7 +115,7 @@ impl Newton<'_> {
         largest
     }
 
-    /// Of every body, whether it has moved by more than its own size and far beyond what can be
+    /// For every body, whether it has moved by more than its own size and far beyond what can be
     /// expected.
     pub(super) fn away(&mut self, increment: &[f64], task: &Task) -> Vec<bool> {
         self.runaway = None;
@@ -162,7 +162,7 @@ impl Newton<'_> {
             .collect()
     }
 
-    /// What the residual is measured against, by body, under these internal forces. The trial state
+    /// Reference of the residual, by body, under these internal forces. The trial state
     /// may be another one afterwards: says whether.
     pub(super) fn scales(
         &mut self,
@@ -286,7 +286,7 @@ impl Newton<'_> {
         })
     }
 
-    /// Factorises the tangents at the start of a step beside the matrix that is held: the equations, if that one is
+    /// Factorises the tangents at the start of a step in addition to the matrix that is held: the equations, if that one is
     /// another, and the internal forces there.
     fn factorise_at_start(
         &mut self,
@@ -315,9 +315,9 @@ impl Newton<'_> {
         Ok((Some(solver), internal))
     }
 
-    /// Solves with the equations that [`Self::factorise_at_start`] gave. Keeps those beside the iterations' own for the
-    /// next time, if they are not large. Where the iterations' own need full row exchanges for it, they have them from
-    /// then on.
+    /// Solves with the equations that [`Self::factorise_at_start`] gave. Keeps the separate
+    /// equations for the next time, if they are not large. If the equations of the iterations need
+    /// full row exchanges for it, they keep them from then on.
     fn solve_at_start(
         &mut self,
         beside: Option<LinearSolver>,
@@ -333,8 +333,8 @@ impl Newton<'_> {
         solution
     }
 
-    /// What a singular tangent matrix says of the model: whether it is held elastically, at the
-    /// start of the step.
+    /// Whether the model with a singular tangent matrix is held elastically, at the start of the
+    /// step.
     pub(super) fn singularity(&mut self, period: (f64, f64)) -> Singularity {
         match self.factorise_at_start(Operator::Elastic, period) {
             Err(singularity) => singularity,

@@ -1,6 +1,6 @@
 //! The loop: predict, evaluate, accept, correct.
 //!
-//! What a step holds fixed is its [`Control`]: the load factor at its end, or the distance along the
+//! The quantity that a step holds fixed is its [`Control`]: the load factor at its end, or the distance along the
 //! path of equilibrium. The loop asks it for everything that depends on that.
 
 use super::Newton;
@@ -32,7 +32,7 @@ impl State {
     }
 }
 
-/// What is added to an iterate.
+/// The correction of an iterate.
 #[derive(Debug)]
 pub(super) struct Correction {
     /// To the displacement increments, by place.
@@ -84,7 +84,7 @@ pub(super) trait Control {
         iterations: &[Iteration],
     ) -> Option<f64>;
 
-    /// The next iterate. What was done is added to the iterations.
+    /// The next iterate. Adds the statistics to those of the iterations.
     fn correct(
         &mut self,
         newton: &mut Newton<'_>,
@@ -121,7 +121,7 @@ pub(super) trait Control {
         Ok(None)
     }
 
-    /// What is said of iterations that have come to their end.
+    /// The failure of iterations that have reached their limit.
     fn give_up(
         &self,
         newton: &mut Newton<'_>,
@@ -167,7 +167,7 @@ impl Newton<'_> {
         }
     }
 
-    /// What iterations that have come to their end at this state lead to: a state that is tolerated, or none.
+    /// The outcome of iterations that end at this state: a tolerated state or a failure.
     fn end_of(
         &mut self,
         control: &mut impl Control,

@@ -1,7 +1,7 @@
 //! The kept matrix: as long as corrections with it take nearly all of the residual away, the matrix of
 //! an earlier iteration, or of the step before, is not replaced.
 //!
-//! Where factorising is dear, corrections with the matrix of the step before, and with the first one that replaces it,
+//! If factorising is expensive, corrections with the matrix of the step before, and with the first one that replaces it,
 //! may also be slow: they are [accelerated](super::acceleration), and it is replaced where even so they stall.
 //!
 //! Whether another one is wanted is known before a state is evaluated; only then are laws asked for
@@ -17,20 +17,21 @@ use crate::settings::Method;
 use law::Operator;
 
 /// A matrix is kept as long as each correction leaves no more than this fraction of the residual:
-/// of equations beside a condensed domain, and of all others. Found by trial: a few iterations more
+/// of equations with a condensed domain, and of all others. Found by trial: a few iterations more
 /// are cheap where the laws of an interface are all there is to evaluate.
 const FAST: [f64; 2] = [0.03, 0.01];
 
-/// Factorising is dear beside a condensed domain where the unknowns of its boundary, to the third power, are more
-/// than so many times the points that laws are called for. Found by trial: beside 324 unknowns and 360 points slow
-/// iterations cost as much as the matrices they save, beside 644 and 720 a run takes 0.87 of its time.
+/// Factorising is expensive with a condensed domain if the unknowns of its boundary, to the third
+/// power, exceed this many times the points that laws are called for. Found by trial: with 324
+/// unknowns and 360 points slow iterations cost as much as the matrices they save; with 644 and 720
+/// a run takes 0.87 of its time.
 const DEAR: f64 = 2e5;
-/// There another matrix counts as much as so many corrections. Between 8 and 30 the time of a run differs by 4 %.
+/// There another matrix costs as much as this many corrections. Between 8 and 30 the time of a run differs by 4 %.
 const AS_MANY: f64 = 11.0;
 /// So many last corrections say how many more it takes.
 const LAST: usize = 3;
 
-/// What decides in a step whether the matrix is kept.
+/// Data of a step that decide whether the matrix is kept.
 #[derive(Debug)]
 pub(super) struct Kept {
     /// How often the matrix has been renewed in this step.
@@ -127,7 +128,7 @@ impl Newton<'_> {
                 }
     }
 
-    /// What laws are asked for in an evaluation that a correction follows.
+    /// The request to laws in an evaluation that a correction follows.
     pub(super) fn operator(&self) -> Operator {
         match self.settings.method {
             _ if !self.renews() => Operator::None,

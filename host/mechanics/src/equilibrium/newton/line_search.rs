@@ -8,7 +8,7 @@ use super::failure::{Reason, StepFailure};
 use super::iterate::{Control, Correction, State};
 use law::Operator;
 
-/// Which fractions are tried, and what is taken if all make the residual grow.
+/// The fractions tried, and the choice if all make the residual grow.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LineSearch {
     /// Fractions of the correction, the longest first.
@@ -18,7 +18,7 @@ pub(super) struct LineSearch {
     pub(super) otherwise: Otherwise,
 }
 
-/// What is taken where the residual grows at every length.
+/// The choice if the residual grows at every length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Otherwise {
     /// The fraction with the smallest residual. Fails only if a law does at every one.
@@ -83,8 +83,8 @@ impl LineSearch {
 }
 
 impl Newton<'_> {
-    /// Follows a correction from an iterate: the fraction taken, and the iterate there. Where the
-    /// step probably `ends` with it, tangents are left out.
+    /// Follows a correction from an iterate: the fraction taken, and the iterate there. If the step
+    /// probably `ends` with it, tangents are left out.
     pub(super) fn search(
         &mut self,
         control: &impl Control,
@@ -130,7 +130,7 @@ mod tests {
         }
     }
 
-    /// A search among states with these residuals; a law fails where there is none.
+    /// A search among states with these residuals; a law fails at the missing ones.
     fn among(otherwise: Otherwise, residuals: [Option<f64>; 3]) -> (usize, Option<(f64, bool)>) {
         let mut tried = 0;
         let found = search(otherwise).among(|_| {

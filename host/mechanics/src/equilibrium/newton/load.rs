@@ -15,11 +15,11 @@ use super::{Newton, norm};
 use crate::settings::Method;
 use law::Operator;
 
-/// A residual is tolerated only where none of so many last corrections was larger than this, relative to the
+/// A residual is tolerated only if none of this many last corrections was larger than this, relative to the
 /// increment: what moves on is a mechanism, however small its residual.
 const LAST: usize = 5;
 const STILL_MOVES: f64 = 0.1;
-/// Nor is one whose displacement increments are so many times those that the iterations started from.
+/// It is not tolerated if the displacement increments are more than this many times those at the start of the iterations.
 const FAR: f64 = 5.0;
 /// Lengths of a correction that the line search tries.
 const STEP_LENGTHS: [f64; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];
@@ -28,8 +28,7 @@ const STEP_LENGTHS: [f64; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];
 #[derive(Debug)]
 pub(super) struct LoadControl {
     task: Task,
-    /// Displacement increments to start from; the tangent at the start predicts them if there are
-    /// none.
+    /// Displacement increments to start from; the tangent at the start predicts them otherwise.
     guess: Option<Vec<f64>>,
     /// With a quasi-Newton matrix, and with others as long as slow corrections do.
     acceleration: Option<Acceleration>,

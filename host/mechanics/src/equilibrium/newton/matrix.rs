@@ -20,7 +20,7 @@ pub(in crate::equilibrium) fn noise(n: usize, force_tolerance: f64) -> f64 {
     NOISE.min(LEFT * force_tolerance) / (n.max(1) as f64).sqrt()
 }
 
-/// What the sum of the groups' tangents is to the solver.
+/// Kind of the sum of the groups' tangents.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Sum {
     /// Another matrix than its last one.
@@ -48,9 +48,9 @@ pub struct Matrix {
     /// The sum of the groups' tangents.
     elements: Elements,
     sum: Sum,
-    /// The same equations once more, for what is asked beside the iterations.
+    /// The same equations again, for questions outside the iterations.
     pub(super) beside: Option<LinearSolver>,
-    /// Who is told beforehand how many bytes these take.
+    /// Callback that receives beforehand the bytes they take.
     announces: Option<Announces>,
 }
 
@@ -72,7 +72,7 @@ impl Matrix {
         Self { announces, ..self }
     }
 
-    /// Says that the equations are about to be factorised once more, for what is asked beside the iterations.
+    /// Announces that the equations will be factorised again, for a question outside the iterations.
     pub(super) fn announce_beside(&self, bytes: u64) {
         if let Some(announces) = self.announces {
             announces(bytes, "factorising the equations once more");

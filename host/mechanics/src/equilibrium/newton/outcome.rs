@@ -1,4 +1,4 @@
-//! What goes into a step and what comes of it, apart from [failures](super::failure).
+//! Input and outcome of a step, apart from [failures](super::failure).
 
 use super::residual::Balance;
 use serde::{Deserialize, Serialize};
@@ -73,7 +73,7 @@ pub struct StepSuccess {
     pub tolerated: f64,
     /// What the residual was measured against, by body.
     pub scales: Vec<f64>,
-    /// What is left open where the residual alone decides.
+    /// Open corrections and forces if the residual alone decides.
     pub open: Option<Open>,
 }
 

@@ -1,6 +1,6 @@
 //! Steps along the path of equilibrium whose load factor is unknown: arc-length control.
 //!
-//! Where some points soften faster than the rest of the model unloads, there is no equilibrium at
+//! If some points soften faster than the rest of the model unloads, there is no equilibrium at
 //! the next load. The path turns back in load and in displacement (a snap-back), but the
 //! deformation of those points goes on. So a step is measured by that,
 //!
@@ -29,7 +29,7 @@ const STEP_LENGTHS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
 /// How far from its distance a state may be, relative to it.
 const THERE: f64 = 1e-6;
 
-/// What a step along the path is measured by: c.
+/// The vector c that measures a step along the path.
 #[derive(Debug)]
 pub struct Measure {
     weights: Vec<f64>,
@@ -121,7 +121,7 @@ impl<'c> ArcLength<'c> {
         }
     }
 
-    /// What an iterate at this increment of the load factor is held against.
+    /// References of an iterate at this increment of the load factor.
     fn task(&self, newton: &Newton<'_>, rise: f64) -> Task {
         let external = self.loads.external(self.from + rise);
         Task {
@@ -189,7 +189,7 @@ impl Control for ArcLength<'_> {
         })
     }
 
-    /// The distance is held only by a correction: no guess is accepted as it is.
+    /// The distance is held only by a correction: no guess is accepted without one.
     fn accept(
         &self,
         newton: &mut Newton<'_>,

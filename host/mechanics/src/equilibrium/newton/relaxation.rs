@@ -4,8 +4,8 @@
 //! whose contacts open, the branch of equilibria may end where one point reaches another piece of
 //! its law: followed on, neither piece leads to an equilibrium. Iterations then alternate between
 //! the two for ever, however small the step (the residual of the cycle is proportional to the
-//! step). What a real body does there is to move on, quickly,
-//! until it finds the next stable equilibrium. The relaxation follows that motion with a
+//! step). A real body moves on quickly there, until it finds the next stable equilibrium. The
+//! relaxation follows that motion with a
 //! viscosity proportional to the elastic stiffness,
 //!
 //!   α K_e u̇ = r(u),    an implicit step of unit time: (K + α K_e) δ = r,
@@ -38,7 +38,7 @@ const FOLLOWS: [f64; 2] = [0.3, 2.0];
 const FALL: f64 = 0.1;
 /// Viscous steps of one motion.
 const MAX_STEPS: usize = 40;
-/// A motion leads away where the residuals of so many last viscous steps are all more than this multiple of the least one
+/// A motion leads away if the residuals of this many last viscous steps are all more than this multiple of the least one
 /// before them. Found by trial: of 169 motions that led to Newton iterations, with the bored pile on 1 917 quads and 24 random
 /// piles, none had done so, and a quarter of the viscous steps of all others came after. With ten steps one would have been lost.
 const LEADS_AWAY: (usize, f64) = (12, 3.0);
@@ -51,7 +51,7 @@ const FIRST: usize = 10;
 /// What a new least residual must be below, relative to the old one.
 const PROGRESS: f64 = 0.9;
 
-/// What relaxation has done in a step.
+/// Statistics of relaxation in a step.
 #[derive(Debug)]
 pub(super) struct Relaxation {
     course: Course,
@@ -87,7 +87,7 @@ struct Motion {
 }
 
 impl Relaxation {
-    /// Of a step to a given load factor.
+    /// The relaxation of a step to a given load factor.
     pub(super) fn new(settings: &Settings) -> Self {
         // Methods that keep their matrix are slow without having come to an end. Arc-length control
         // has a way of its own to leave a branch.
@@ -130,8 +130,8 @@ impl Relaxation {
         matches!(self.course, Course::Ready)
     }
 
-    /// Where Newton iterations stand still, or at a state that no correction can be computed for (`is_singular`), the
-    /// state that they go on from: a relaxed one or, if there is none, that of the first standstill. `None` where they
+    /// If Newton iterations stall, or at a state that no correction can be computed for (`is_singular`), the
+    /// state that they go on from: a relaxed one or, if absent, that of the first standstill. `None` where they
     /// get on, and where nothing leads away from a singular state.
     ///
     /// # Errors

@@ -26,9 +26,9 @@ pub(super) struct Balance {
     /// The largest of all bodies.
     pub(super) relative: f64,
     pub(super) by_body: Vec<f64>,
-    /// What it is relative to, by body.
+    /// Its reference, by body.
     pub(super) scales: Vec<f64>,
-    /// Of every body, whether it has run away.
+    /// For every body, whether it has diverged.
     pub(super) away: Vec<bool>,
     pub(super) unreliable: Option<String>,
 }
@@ -183,7 +183,7 @@ impl Newton<'_> {
     }
 }
 
-/// The largest of some sizes; not a number if one is none.
+/// The largest of some sizes; NaN if one is NaN.
 fn largest(sizes: &[f64]) -> f64 {
     let larger = |a: f64, b: &f64| if *b > a || b.is_nan() { *b } else { a };
     sizes.iter().fold(0.0, larger)

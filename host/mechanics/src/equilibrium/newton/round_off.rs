@@ -16,8 +16,9 @@ pub(crate) const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
 
 impl Newton<'_> {
     /// Whether a small residual is one that the last bit of the displacement increments makes, so
-    /// that no iteration can lessen it: in all bodies that are not in equilibrium anyway after the last iteration. One
-    /// that is within its tolerance while corrections go on is none. The trial state stays.
+    /// that no iteration can lessen it: in all bodies that are not in equilibrium anyway after the
+    /// last iteration. A residual within its tolerance while corrections go on is not round-off.
+    /// The trial state stays.
     pub(super) fn is_round_off(
         &mut self,
         increment: &[f64],

@@ -1,4 +1,4 @@
-//! What an iterate amounts to, by [what is asked of it](super::acceptance): the sizes of a residual
+//! Convergence of an iterate, by [what is asked of it](super::acceptance): the sizes of a residual
 //! and of a correction, body by body, are handed there.
 
 use super::Newton;
@@ -39,7 +39,7 @@ impl Newton<'_> {
         Iteration::of(at, relative, length)
     }
 
-    /// What is asked of a state, of one that was corrected with the matrix of an earlier step or not.
+    /// Criteria of a state, corrected with the matrix of an earlier step or not.
     fn criteria(&self, is_stale: bool) -> Criteria {
         Criteria {
             force: self.settings.force_tolerance,
@@ -70,7 +70,7 @@ impl Newton<'_> {
         bodies.into_iter().all(|is_there| is_there)
     }
 
-    /// Which bodies are in equilibrium after an iteration.
+    /// Bodies in equilibrium after an iteration.
     pub(super) fn in_equilibrium(&self, balance: &Balance, last: &Iteration) -> Vec<bool> {
         let criteria = self.criteria(last.correction.is_some() && self.keeps());
         let is_whole =
@@ -79,7 +79,7 @@ impl Newton<'_> {
         bodies.map(|body| body.is_equilibrium(criteria)).collect()
     }
 
-    /// What a state of equilibrium leaves open, if the residual alone has made it one.
+    /// Open corrections and forces of a state that the residual alone has accepted.
     pub(super) fn open(&self, balance: &Balance, iterations: &[Iteration]) -> Option<Open> {
         if self.settings.convergence != Convergence::Force {
             return None;

@@ -2,7 +2,7 @@ use super::*;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Cells of size 1, `columns` by `rows`: quads, but triangles where a function of column and row
-/// says so.
+/// reports it.
 struct Grid {
     columns: usize,
     coordinates: Vec<[f64; 2]>,

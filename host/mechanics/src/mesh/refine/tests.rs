@@ -1,7 +1,7 @@
 use super::*;
 use std::collections::BTreeMap;
 
-/// A quad beside a triangle: the unit square [0, 1]² and the triangle to its right with the tip
+/// A quad next to a triangle: the unit square [0, 1]² and the triangle to its right with the tip
 /// (2, 0). `bulge` moves the middle of the quad's left side, of the common side and of the
 /// triangle's long side.
 fn mixed(bulge: f64) -> Mesh {

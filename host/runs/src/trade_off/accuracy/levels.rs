@@ -95,7 +95,7 @@ impl Levels {
     }
 
     /// The differences of the three finest, coarse to middle and middle to fine, where they do not fall as those of
-    /// an error of any order would: what is refined leads to no limit. Round-off leads nowhere, and is none.
+    /// an error of any order would: what is refined leads to no limit. Round-off has no order.
     pub(super) fn growth(&self) -> Option<[f64; 2]> {
         let ([a, b, c], [coarse, fine]) = self.three()?;
         // Of order 0: the error grows with the logarithm of n.
@@ -266,7 +266,7 @@ mod tests {
         assert!(levels(0.1, &[4.0, 8.0, 16.0]).growth().is_none());
     }
 
-    /// Runs of two phases of so many increments, the first one linear or not.
+    /// Runs of two phases of this many increments, the first one linear or not.
     #[test]
     fn a_phase_has_three_increments_or_is_linear_where_an_error_is_told() {
         let of = |increments: [[usize; 2]; 3], is_linear: bool| {

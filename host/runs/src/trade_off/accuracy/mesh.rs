@@ -11,11 +11,11 @@ use std::time::Duration;
 
 /// Divisions of the sides of elements, coarse to fine.
 const DIVISIONS: [usize; 3] = [2, 4, 8];
-/// All refined runs together may take so many times the CPU time of the run on the file's mesh, or so many
+/// All refined runs together may take this many times the CPU time of the run on the file's mesh, or this many
 /// seconds, whichever is more.
 const BUDGET: f64 = 100.0;
 const LEAST_BUDGET: f64 = 20.0;
-/// A run on a mesh of half the size of elements probably takes so many times as long: four times the elements,
+/// A run on a mesh of half the size of elements probably takes this many times as long: four times the elements,
 /// with twice the bandwidth.
 const DEARER: f64 = 8.0;
 

@@ -22,7 +22,7 @@ const TOLERANCES: [f64; 5] = [1e-3, 1e-4, 1e-5, 1e-6, 1e-7];
 const SHARES: [f64; 2] = [0.85, 0.1];
 /// The finest run has to be better than the target by this factor before any run is chosen.
 const MARGIN: f64 = 0.7;
-/// Of other schemes than the file's one has to be cheaper than another by this factor.
+/// Another scheme than the file's has to be cheaper by this factor.
 const WORTH_A_CHANGE: f64 = 0.8;
 /// An error that is still this many times the target at the most increments, would it fall in proportion
 /// to them, does not get there.
@@ -40,7 +40,7 @@ pub(super) struct Found {
     pub(super) worst: Option<String>,
     /// How the error was estimated.
     pub(super) estimate: String,
-    /// Of the runs that tell it, so many cut steps back.
+    /// Number of the runs behind it that cut steps back.
     pub(super) cut_back: usize,
     pub(super) trial: Trial,
     pub(super) scale: Vec<f64>,
@@ -109,7 +109,7 @@ impl Search<'_> {
     }
 
     /// Doubles increments until the finest run is good enough, or the coarsest takes more seconds than the
-    /// limit. What comes to no end is passed over.
+    /// limit. Runs that do not finish are skipped.
     fn with(&mut self, settings: &Settings, most: f64, limit: Option<f64>) -> Result<Found, Error> {
         let mut levels = Levels::of_increments();
         let mut last_increments = Vec::new();
@@ -175,7 +175,7 @@ impl Search<'_> {
         });
     }
 
-    /// A trial, or why there is none where the study goes on without it; that is kept and said.
+    /// A trial, or why none exists where the study goes on without it; that is kept and said.
     ///
     /// # Errors
     /// What ends the study.
@@ -218,7 +218,7 @@ impl Search<'_> {
         error <= MARGIN * self.asked || at_most_increments > HOPELESS * self.asked
     }
 
-    /// What is best of the runs that came to their end.
+    /// The best of the finished runs.
     fn found(&self, levels: Levels) -> Option<Found> {
         let (finest_factor, finest) = levels.finest()?;
         let scale = finest.rows.largest();
@@ -242,7 +242,7 @@ impl Search<'_> {
         })
     }
 
-    /// Of settings that are good enough the loosest tolerance that takes fewer iterations and hardly changes
+    /// Among sufficient settings, the loosest tolerance that takes fewer iterations and hardly changes
     /// the result, and how much that is.
     ///
     /// # Errors

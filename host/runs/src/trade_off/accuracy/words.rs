@@ -10,7 +10,7 @@ pub(super) fn failed(run: usize, failed: &FailedTrial) -> String {
     format!("{STUDY}: run {run} failed: {}", failed.reason)
 }
 
-/// Schemes are not looked for: a run takes so many seconds.
+/// Schemes are not looked for: a run takes this many seconds.
 pub(super) fn no_schemes(seconds: f64) -> String {
     let takes = in_words(seconds);
     format!("{STUDY}: a run takes {takes}, so the schemes of the laws are left as they are")
@@ -43,7 +43,7 @@ pub(super) fn mesh_failed(division: usize) -> String {
     format!("mesh / {division} failed")
 }
 
-/// How the error of so many meshes was estimated, and why there is no finer one.
+/// How the error of this many meshes was estimated, and why there is no finer one.
 pub(super) fn mesh_estimate(n: usize, [least, order]: [f64; 2], why: Option<String>) -> String {
     let mut text = match n {
         1 => "none, there is no finer mesh to tell it".to_owned(),
@@ -59,7 +59,7 @@ pub(super) fn mesh_estimate(n: usize, [least, order]: [f64; 2], why: Option<Stri
     text
 }
 
-/// Why the error of so many meshes is not estimated: the difference of the two finest is not smaller than the one
+/// Why the error of this many meshes is not estimated: the difference of the two finest is not smaller than the one
 /// before.
 pub(super) fn mesh_diverges(n: usize, [coarse, fine]: [f64; 2], why: Option<String>) -> String {
     let mut text = format!(
@@ -86,7 +86,7 @@ pub(super) fn outcome(chosen: &Chosen) -> Result<String, String> {
     }
 }
 
-/// Of columns that do not count.
+/// Note about columns that do not count.
 pub(in super::super) fn zero(names: &[String]) -> String {
     let names: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
     let (is, counts) = match names.len() {
@@ -99,7 +99,7 @@ pub(in super::super) fn zero(names: &[String]) -> String {
     )
 }
 
-/// What was chosen, the error that it has, and what failed on the way.
+/// The choice, its error, and the failed trials.
 fn settings(chosen: &Chosen) -> String {
     let asked = format!("{:.1e} asked for", chosen.asked);
     let error = match (chosen.reached, chosen.without_mesh, chosen.difference) {

@@ -332,7 +332,7 @@ pub(super) fn response_is_isotropic(subject: &Subject) -> Found {
 /// Part of the increment that doubles the flux, for differences of fluxes.
 const PART: f64 = 1e-4;
 
-/// What the elastic shear modulus is of that which belongs to the normal components, if it is another: by the elastic
+/// Ratio of the elastic shear modulus to the one that follows from the normal components, if they differ: by the elastic
 /// operator, or by the fluxes that are returned.
 fn shear_factor(specimen: &Specimen, random: &mut Random) -> Option<f64> {
     let Origin { start, size, .. } = specimen.origin(random).ok()?;

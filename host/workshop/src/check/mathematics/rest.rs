@@ -102,9 +102,9 @@ struct Rest {
     point: PointStart,
     /// The call that a capsule has: the increment that has led there, so that a replay leads there too.
     told: PointStart,
-    /// How little flux is none.
+    /// Flux that counts as zero.
     flux: f64,
-    /// Of the increment before, and internal variables before it.
+    /// The increment before, and the internal variables before it.
     size: f64,
     before: Vec<f64>,
     /// Internal variables that need not stay.

@@ -89,7 +89,7 @@ fn sheared_far(
     Ok(way)
 }
 
-/// What sine, cosine and tangent repeat after, in degrees that are taken for radians, and in radians
+/// Period of sine, cosine and tangent, in degrees that are taken for radians, and in radians
 /// that are turned into degrees once more.
 const PERIODS: [f64; 2] = [
     std::f64::consts::TAU,

@@ -111,8 +111,8 @@ pub(super) fn tangent_matches_differences(subject: &Subject) -> Found {
 /// Steps of each kind that are compared at least.
 const OF_EACH_KIND: usize = 3;
 
-/// What a step looks like from outside: how large each entry of its tangent is beside the elastic
-/// operator, and what became of each internal variable.
+/// Outside view of a step: the size of each entry of its tangent relative to the elastic operator,
+/// and the change of each internal variable.
 fn kind(step: &Step, elastic: &PointEnd) -> Vec<u8> {
     let scale = largest(&elastic.tangent);
     let entries = step.end.tangent.iter().zip(&elastic.tangent);

@@ -1,4 +1,4 @@
-//! Does a result depend on what is asked for beside it, or on when it is?
+//! Does a result depend on what is asked for next to it, or on when it is?
 
 use super::{Called, UPDATE, compare};
 use crate::check::margins;

@@ -230,7 +230,7 @@ fn after_other_instances(
 /// Instances that are made until one stands where another one stood.
 const PLACES: usize = 256;
 
-/// An instance that stands where this one stands, which is destroyed; nothing if none comes to stand there.
+/// An instance that stands where this one stands, which is destroyed; nothing if none comes to be there.
 fn in_place_of(
     other: Probe,
     create: impl Fn() -> Result<Option<Probe>, Verdict>,

@@ -59,7 +59,7 @@ impl Environment {
         }
     }
 
-    /// What is not as it was.
+    /// The change.
     fn changed(&self, after: &Self) -> Option<String> {
         let more = |before: Option<usize>, after: Option<usize>| {
             let more = after?.checked_sub(before?)?;

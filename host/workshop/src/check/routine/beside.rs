@@ -1,4 +1,4 @@
-//! Does a routine read beside its arguments? The guard words there hold a NaN, which a comparison passes over: other
+//! Does a routine read next to its arguments? The guard words there hold a NaN, which a comparison passes over: other
 //! numbers in their place change what depends on them.
 
 use super::change;
@@ -7,10 +7,10 @@ use crate::check::mathematics::UPDATE;
 use crate::check::specimen::{Specimen, first_difference};
 use law::probe::{PointEnd, PointStart};
 
-/// What stands there in turn: comparisons with zero and one come out otherwise.
+/// What is there in turn: comparisons with zero and one come out otherwise.
 const OTHERS: [f64; 3] = [1.0, -1.0, 0.0];
 
-/// The first of the points at which a routine reads beside its arguments, with where that is, in words.
+/// The first of the points at which a routine reads next to its arguments, with where that is, in words.
 pub(super) fn reads_beside(
     routine: &Specimen,
     points: &[PointStart],

@@ -11,7 +11,7 @@ use abi::raw;
 use law::Moment;
 use law::probe::{Form, PointEnd, PointStart};
 
-/// What is said to a routine otherwise than in the second increment of a second step.
+/// Arguments of a routine that differ from those in the second increment of a second step.
 struct Other {
     /// In words.
     what: String,
@@ -23,7 +23,7 @@ struct Other {
     is_declared: bool,
 }
 
-/// What a routine is told in the second increment of a second step: at what time, and which one it is.
+/// Arguments of a routine in the second increment of a second step: time and numbers.
 fn later(routine: &Specimen) -> (f64, Moment) {
     let length = routine.time_increment;
     let moment = Moment {
@@ -36,7 +36,7 @@ fn later(routine: &Specimen) -> (f64, Moment) {
     (3.0 * length, moment)
 }
 
-/// What must not matter to a routine that has begun.
+/// Arguments that must not change a routine that has begun.
 fn others(routine: &Specimen) -> Vec<Other> {
     let (time, moment) = later(routine);
     let counter = Words::of(routine).increment;
@@ -175,7 +175,7 @@ fn judged(
 const ALONE: usize = 4;
 
 /// Whether the first call after another moment is the same as when it is repeated: the two differ by what is
-/// kept in SAVE. Of the last increments, where most has happened, each alone.
+/// kept in SAVE. The last increments, with the largest changes, each alone.
 fn remembers(routine: &Specimen, steps: &[&Step], other: &Other) -> Result<(), Verdict> {
     let Words { stress, state, .. } = Words::of(routine);
     for step in steps.iter().rev().take(ALONE) {

@@ -65,8 +65,8 @@ pub(super) fn routine_stays_at_rest(subject: &Subject) -> Found {
 /// How near a component is to what elasticity alone makes of it, and how far others are.
 const PREDICTED: [f64; 2] = [1e-10, 1e-6];
 
-/// What an increment has left as it was, bit by bit, or as elasticity alone makes it, by the names that the routine
-/// has for it. A component that is zero says nothing.
+/// Arguments that an increment has left unchanged, bit by bit, or as elasticity alone makes them,
+/// by the routine's names. A component that is zero says nothing.
 fn unreturned(routine: &Specimen, step: &Step) -> Result<Option<String>, Verdict> {
     let words = Words::of(routine);
     let components = routine.hypothesis.components();

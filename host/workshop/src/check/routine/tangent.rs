@@ -8,13 +8,13 @@ use crate::check::walk::Step;
 use crate::check::{Found, Subject, Verdict, skipped};
 use law::Tangent;
 
-/// Steps whose tangents are compared with differences, one in so many.
+/// Steps whose tangents are compared with differences, one in this many.
 const COMPARED: usize = 3;
 
 /// How near a ratio is to 2 or 1/2 where shear strains are confused.
 const FACTOR: f64 = 1e-3;
 
-/// What is found of the stiffness of many steps.
+/// Findings about the stiffness of many steps.
 #[derive(Default)]
 struct Tally {
     n_compared: usize,
@@ -96,7 +96,7 @@ impl Tally {
     }
 }
 
-/// Whether the stiffness is symmetric, as it is said to be.
+/// Whether the stiffness is symmetric, as it is reported to be.
 fn is_symmetric(routine: &Specimen, step: &Step, scale: f64) -> Result<(), Verdict> {
     let n = routine.probe.n_components();
     let entry = |i: usize, j: usize| step.end.tangent[i * n + j];

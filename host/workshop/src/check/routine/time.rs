@@ -1,4 +1,4 @@
-//! Does the time matter to a routine where that is said, and nowhere else?
+//! Does the time matter to a routine where that is reported, and nowhere else?
 
 use super::words::{Words, advice};
 use super::{bits, differ, each, starts};

@@ -68,7 +68,7 @@ pub(super) fn has_sidecar(routine: &Specimen) -> bool {
     routine.law.library().foreign().map(|f| f.adapter) == Some(Adapter::Umat)
 }
 
-/// What an author of a UMAT can write into the sidecar; nothing of routines that have none.
+/// Hint for the author of a UMAT about the sidecar; empty for routines without one.
 pub(super) fn advice(routine: &Specimen, text: &'static str) -> &'static str {
     if has_sidecar(routine) { text } else { "" }
 }
