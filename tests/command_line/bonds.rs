@@ -1,5 +1,5 @@
 //! Bonds without normal stress that break at the first tension, along the shaft of a pile: an equilibrium is found, with the
-//! same head load whatever the increments; where there is none the end of the run names what gives way, and what helps.
+//! same head load whatever the increments; where absent the end of the run names what gives way, and what helps.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "part of the tests")]
 
 use crate::program::{DONE, NO_EQUILIBRIUM, Place};

@@ -97,7 +97,7 @@ fn a_block_whose_edge_is_torn_off_comes_to_the_equilibrium_of_statics() {
     }
 }
 
-/// An equilibrium that is found where nothing else found one is said.
+/// An equilibrium that is found where nothing else found one is reported.
 #[test]
 fn single_corrections_are_told() {
     let finished = run(&pushed(5, "cohesion = 18.17", &along(), ""));

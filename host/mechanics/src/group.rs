@@ -1,7 +1,7 @@
 //! A group of elements with its law: committed and trial state of every integration point.
 //!
-//! An increment starts from the committed state; every iteration computes the trial state anew
-//! from it, so a failed increment leaves nothing behind.
+//! An increment starts from the committed state; every iteration computes the trial state from it,
+//! so a failed increment leaves nothing behind.
 
 mod aside;
 mod breaks;
@@ -224,13 +224,13 @@ pub struct Group {
     /// Stresses (zero thickness: tractions) in axes of the elements.
     pub stress: Field,
     /// What exact integration adds to the tractions that an interface began with, point by point; empty where that is
-    /// nothing. Elements carry it beside the law's answer, so that ground at rest stays at rest.
+    /// nothing. Elements carry it next to the law's answer, so that ground at rest stays at rest.
     correction: Vec<f64>,
     /// Internal variables of the law.
     pub internal: Field,
     /// The law.
     pub law: Material,
-    /// Which step and increment it is, for laws that ask.
+    /// Numbers of step and increment, for laws that ask.
     pub moment: Moment,
     /// Calls of the laws used so far; the last one is that of the current law.
     pub law_calls: Vec<LawCalls>,
@@ -243,7 +243,7 @@ pub struct Group {
     varying: Option<Varying>,
     /// Where the points lie, if the law asks.
     sites: Vec<Site>,
-    /// What it is called where calls of laws are watched.
+    /// Its name where calls of laws are watched.
     watched: u64,
     /// Tangents of the element, point by point; of a linear law, those of one element only.
     tangent: Vec<f64>,
@@ -307,7 +307,7 @@ impl Group {
     /// from the current stress and jumps are counted from here. Initial values that the case file gives
     /// hold in both cases.
     ///
-    /// Returns what a law that starts anew knows nothing of.
+    /// Returns the state that a restarted law does not know.
     ///
     /// # Errors
     /// The law cannot start from the stress.
@@ -351,8 +351,8 @@ impl Group {
         })
     }
 
-    /// A group that is there from now on, free of strain, with this stress in axes of its elements. Its
-    /// law starts anew.
+    /// A group that is there from now on, free of strain, with this stress in axes of its elements.
+    /// Its law restarts.
     ///
     /// # Errors
     /// The law cannot start from the stress.
@@ -443,7 +443,7 @@ impl Group {
         Ok(())
     }
 
-    /// What the law makes of the stresses before anything has happened.
+    /// Stresses that the law returns before any deformation.
     fn initial_state(&self) -> Result<Vec<f64>, PointFailure> {
         let place = self.flux_place();
         calls::of_group(self.watched, 0, self.kinematics.points_of(0).len());
@@ -461,7 +461,7 @@ impl Group {
         Ok(internal)
     }
 
-    /// Consecutive points of one law, at most so many at a time.
+    /// Consecutive points of one law, at most this many at a time.
     fn pieces(&self, most: usize) -> Vec<(Range<usize>, &Law)> {
         let all = [(0..self.kinematics.n_points(), 0)];
         let runs = self
@@ -512,7 +512,7 @@ impl Group {
         self.layer.is_some() && self.law.built.law.n_components() == 2
     }
 
-    /// Where the law's fluxes stand within the stresses: all of them, or, of a thin layer with an
+    /// Positions of the law's fluxes within the stresses: all of them, or, of a thin layer with an
     /// interface law, components 22 (normal) and 12 (shear).
     fn flux_place(&self) -> Strided {
         if self.uses_layer() {
@@ -816,7 +816,7 @@ impl Group {
             .then(|| axes.stress_to_global([s[0], s[1], s[2], s[3]]))
     }
 
-    /// Stress that an element carries at a place in or beside it, in global axes (committed): the plane
+    /// Stress of an element at a place in it or next to it, in global axes (committed): the plane
     /// that is nearest to the stresses at its points.
     pub fn carried_at(&self, element: usize, at: [f64; 2]) -> [f64; 4] {
         let (points, axes) = (
@@ -869,7 +869,7 @@ impl Group {
         })
     }
 
-    /// An internal variable of a point (committed); `None` if the law has none of this id.
+    /// An internal variable of a point (committed); `None` if the law has no variable of this id.
     pub fn internal_variable(&self, point: usize, id: &str) -> Option<f64> {
         let variables = &self.law.built.law.formulation().internal_variables;
         let number = variables.iter().position(|variable| variable.id == id)?;

@@ -1,7 +1,7 @@
 //! What the points of an interface do not integrate of the tractions that it begins with.
 //!
 //! Laws are asked at the nodes, and forces at the nodes are not the integral of a stress that grows along a side whose
-//! radius or direction changes. What they lack stays beside the law's answer, so that tractions are the stress of the ground
+//! radius or direction changes. What they lack stays next to the law's answer, so that tractions are the stress of the ground
 //! and nothing moves.
 
 use super::Group;
