@@ -89,10 +89,10 @@ impl Observer for Progress {
 
     fn cut_back(&mut self, place: &Place, reason: &str) {
         self.cut_backs += 1;
-        if self.cut_backs <= 10 {
-            self.say(&format!("{place}: step cut back: {reason}"));
-        } else if self.cut_backs == 11 {
-            self.say("further cut-backs are only in log.jsonl");
+        if self.cut_backs == 1 {
+            self.say(&format!(
+                "{place}: step cut back (all of them: log.jsonl): {reason}"
+            ));
         }
     }
 

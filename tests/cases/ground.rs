@@ -82,17 +82,17 @@ fn pushed(control: &str, increments: u32) -> (usize, f64) {
 }
 
 /// Where joints slide and ground yields all around, the tangent of an iterate is singular though the step has an
-/// equilibrium: by creep it is left behind without a cut-back, in ten increments for the same load.
+/// equilibrium: under viscous control it is left behind without a cut-back, in ten increments for the same load.
 #[test]
-fn creep_leaves_singular_tangents_behind() {
+fn viscous_control_leaves_singular_tangents_behind() {
     let (_, by_load) = pushed("load", 10);
-    let (cut_backs, by_creep) = pushed("creep", 10);
+    let (cut_backs, by_viscous_control) = pushed("viscous", 10);
     assert_eq!(cut_backs, 0);
     assert!(
-        (by_creep / by_load - 1.0).abs() < 0.02,
-        "{by_creep} kN, {by_load} kN by load"
+        (by_viscous_control / by_load - 1.0).abs() < 0.02,
+        "{by_viscous_control} kN, {by_load} kN by load"
     );
-    assert_eq!(pushed("creep", 3).0, 0);
+    assert_eq!(pushed("viscous", 3).0, 0);
 }
 
 #[test]

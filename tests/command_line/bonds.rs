@@ -6,7 +6,7 @@ use crate::program::{DONE, NO_EQUILIBRIUM, Place};
 use serde_json::Value;
 use std::path::Path;
 
-/// Head load at 1 mm, kN, as one increment of creep finds it, in which no viscous step fails.
+/// Head load at 1 mm, kN, as one increment of viscous control finds it, in which no viscous step fails.
 const LOAD: f64 = -22.198;
 /// Other points may break on another way.
 const NEAR: f64 = 2e-3;
@@ -29,7 +29,7 @@ fn head_load(place: &Place) -> f64 {
 #[test]
 fn bonds_that_break_at_the_first_tension_lead_to_an_equilibrium() {
     let mut loads = Vec::new();
-    for control in ["auto", "creep"] {
+    for control in ["auto", "viscous"] {
         for increments in [1, 10] {
             let (place, text) = place();
             let increments = format!("increments = {increments}");

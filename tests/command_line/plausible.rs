@@ -532,13 +532,13 @@ fn choices_of_the_solver_without_effect_are_said_with_their_line() {
     let text = edited(&[]);
     let at = text.find("[solver]").unwrap();
     let place = format!("case.toml:{}:", text[..at].matches('\n').count() + 1);
-    let says = "`control = \"creep\"` has no effect with `method = \"modified_newton\"`";
-    let creep = "[solver]\nmethod = \"modified_newton\"\ncontrol = \"creep\"";
-    warns(&[("[solver]", creep)], &[&place, says]);
+    let says = "`control = \"viscous\"` has no effect with `method = \"modified_newton\"`";
+    let viscous = "[solver]\nmethod = \"modified_newton\"\ncontrol = \"viscous\"";
+    warns(&[("[solver]", viscous)], &[&place, says]);
     let says = "`tangents = \"differences\"` has no effect with `method = \"initial_stress\"`";
     let differences = "[solver]\nmethod = \"initial_stress\"\ntangents = \"differences\"";
     warns(&[("[solver]", differences)], &[&place, says]);
-    let newton = "[solver]\nmethod = \"newton\"\ncontrol = \"creep\"\ntangents = \"differences\"";
+    let newton = "[solver]\nmethod = \"newton\"\ncontrol = \"viscous\"\ntangents = \"differences\"";
     let said = warnings(&[("[solver]", newton)]);
     assert!(!said.iter().any(|w| w.contains("no effect")), "{said:?}");
 }

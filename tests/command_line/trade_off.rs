@@ -156,7 +156,7 @@ fn draws_the_diagram_and_the_page() {
 #[ignore = "a minute and a half: a study of all settings of a case"]
 fn a_case_is_measured_on_its_mesh_and_against_a_finer_one() {
     let place = Place::new();
-    // By load alone: creep, which `auto` turns to with the fewest increments, comes nearer with these than
+    // By load alone: viscous control, which `auto` turns to with the fewest increments, comes nearer with these than
     // with more of them.
     let text = edited(HARDENING).replacen("[solver]", "[solver]\ncontrol = \"load\"", 1);
     let outcome = study(&place, "case.toml", &text, &["--thorough"]);

@@ -82,7 +82,7 @@ fn shear_force() -> f64 {
 #[test]
 fn a_block_whose_edge_is_torn_off_comes_to_the_equilibrium_of_statics() {
     for increments in [5, 10, 20] {
-        for control in ["auto", "creep"] {
+        for control in ["auto", "viscous"] {
             let settings = format!("solver.control = \"{control}\"");
             let text = pushed(increments, "cohesion = 18.17", &along(), &settings);
             let folder = tempfile::tempdir().unwrap();
@@ -102,8 +102,8 @@ fn a_block_whose_edge_is_torn_off_comes_to_the_equilibrium_of_statics() {
 fn single_corrections_are_told() {
     let finished = run(&pushed(5, "cohesion = 18.17", &along(), ""));
     let phases = &finished.summary()["phases"];
-    assert!(phases[0]["crept_singly_from"].is_null());
-    assert_eq!(phases[1]["crept_singly_from"], 3);
+    assert!(phases[0]["single_corrections_from"].is_null());
+    assert_eq!(phases[1]["single_corrections_from"], 3);
     let warnings = &finished.observer.warnings;
     let says =
         "phase `push`, increment 3: nothing found an equilibrium, as it is where bonds break";

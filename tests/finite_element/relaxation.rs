@@ -6,7 +6,7 @@
 //! Boundary    as there; confined in 10 increments, the head pushed by 2 mm in 20, the law swapped as that starts
 //! Law         mohr_coulomb without cohesion (not associated), mepi in the interface
 //! Asserts     equilibrium of the loads, every increment ended by Newton iterations within the
-//!             tolerance, by relaxation and by creep; without, exit code 2 and the point that alternates; by creep
+//!             tolerance, by relaxation and under viscous control; without, exit code 2 and the point that alternates; under viscous control
 //!             the same in another unit of stress, in the mirror, and with x and y exchanged, to 1e-8
 
 use crate::setup::{Finished, Results, assert_close, fail, run};
@@ -107,29 +107,28 @@ fn relaxation_finds_the_next_equilibrium() {
     }
     // Other equilibria may lie near, so that another way is tried and what it leads to is said.
     let warnings = &finished.observer.warnings;
-    let says =
-        |warning: &&String| warning.contains("viscous relaxation led to the next equilibrium:");
+    let says = |warning: &&String| warning.contains("viscous relaxation found");
     let warning = warnings.iter().find(says).expect("a warning");
     // Where another way leads the same step is at hand, too: it is not the same to the last digit, nor far away.
     let apart = warning
-        .split("the same step leads to the same one, within ")
+        .split("the next equilibrium, which is unique to ")
         .nth(1);
-    let displacements: f64 = apart.unwrap().split(' ').next().unwrap().parse().unwrap();
-    assert!(displacements > 0.0 && displacements < 0.1, "{warning}");
+    let distance: f64 = apart.unwrap().parse().unwrap();
+    assert!(distance > 0.0 && distance < 0.1, "{warning}");
 }
 
-/// The same by creep: its states are equilibria by the same tolerance, the head gains load all the way, and
+/// The same under viscous control: its states are equilibria by the same tolerance, the head gains load all the way, and
 /// ends within 1 % of where the relaxation ends (several equilibria exist).
 #[test]
-fn creep_finds_the_next_equilibrium() {
-    let crept = run(&chamber("\n[solver]\ncontrol = \"creep\"\n"));
-    let loading = &crept.summary()["phases"][1];
+fn viscous_control_finds_the_next_equilibrium() {
+    let viscous = run(&chamber("\n[solver]\ncontrol = \"viscous\"\n"));
+    let loading = &viscous.summary()["phases"][1];
     assert!(loading["relaxed_steps"].as_u64().unwrap() >= 1, "{loading}");
-    assert_equilibria(&crept);
+    assert_equilibria(&viscous);
     let relaxed = run(&chamber(""));
     let end = |results: &Finished| *results.in_phase("loading", "q_t").last().unwrap();
     let head = end(&relaxed);
-    assert_close("head", end(&crept), head, 0.01, head);
+    assert_close("head", end(&viscous), head, 0.01, head);
 }
 
 #[test]
@@ -245,12 +244,12 @@ normal = {{ group = "skin", quantity = "traction_n" }}
     )
 }
 
-/// The path of a body that creeps is its own: relaxation has led the mirror image to another
+/// The path of a viscous body is its own: relaxation has led the mirror image to another
 /// equilibrium, a thousandth away in displacements. The lift takes 140 iterations with cut-backs; mirrored and exchanged at once, round-off decides
 /// one of them otherwise (149), and the way back starts elsewhere: that is left out.
 #[test]
-fn creep_depends_on_no_unit_mirror_or_numbering() {
-    let reference = run(&punch(OWN, "creep"));
+fn viscous_control_depends_on_no_unit_mirror_or_numbering() {
+    let reference = run(&punch(OWN, "viscous"));
     let loading = &reference.summary()["phases"][0];
     assert!(loading["relaxed_steps"].as_u64().unwrap() >= 3, "{loading}");
     for (unit, mirrored, exchanged) in [
@@ -265,7 +264,7 @@ fn creep_depends_on_no_unit_mirror_or_numbering() {
             mirrored,
             exchanged,
         };
-        let other = run(&punch(view, "creep"));
+        let other = run(&punch(view, "viscous"));
         let phases = if mirrored && exchanged { 1 } else { 3 };
         for phase in ["load", "lift", "back"].into_iter().take(phases) {
             for (probe, unit) in [("moved", 1.0), ("stress", unit), ("normal", unit)] {
@@ -279,10 +278,10 @@ fn creep_depends_on_no_unit_mirror_or_numbering() {
     }
 }
 
-/// Where steps of the load find no equilibrium, short steps of creep lead to the end of the increment by
+/// Where steps of the load find no equilibrium, short steps under viscous control lead to the end of the increment by
 /// themselves, and only there: alone, the load leads no further without halvings.
 #[test]
-fn creep_leads_where_steps_of_the_load_fail() {
+fn viscous_control_leads_where_steps_of_the_load_fail() {
     let of = |control: &str| {
         let text = punch(OWN, control);
         let set = format!("control = \"{control}\"\n");
@@ -292,8 +291,8 @@ fn creep_leads_where_steps_of_the_load_fail() {
     let (auto, load) = (run(&of("auto")), fail(&of("load")));
     assert_eq!(load.error.exit_code(), 2);
     let phases = auto.summary()["phases"].as_array().unwrap().clone();
-    let crept_from: Vec<_> = phases.iter().map(|p| p["crept_from"].as_u64()).collect();
-    assert_eq!(crept_from, [None, Some(1), None]);
+    let viscous_from: Vec<_> = phases.iter().map(|p| p["viscous_from"].as_u64()).collect();
+    assert_eq!(viscous_from, [None, Some(1), None]);
     let warnings = &auto.observer.warnings;
     let says =
         |warning: &&String| warning.contains("`lift`, increment 1: shorter and shorter steps");
@@ -321,13 +320,13 @@ fn relaxation_leads_away_from_singular_tangents() {
 }
 
 #[test]
-fn what_creep_led_to_is_not_said_to_be_relaxed() {
-    let finished = run(&punch(OWN, "creep"));
+fn what_viscous_control_led_to_is_not_said_to_be_relaxed() {
+    let finished = run(&punch(OWN, "viscous"));
     let warnings = &finished.observer.warnings;
     let say = |words: &str| warnings.iter().filter(|w| w.contains(words)).count();
     assert_eq!(say("relax"), 0, "{warnings:?}");
     assert!(
-        say("; creep led to the next equilibrium;") >= 1,
+        say("; viscous control found the next equilibrium.") >= 1,
         "{warnings:?}"
     );
     let often = warnings
@@ -335,12 +334,12 @@ fn what_creep_led_to_is_not_said_to_be_relaxed() {
         .find(|w| w.contains("steps in all"))
         .unwrap();
     assert!(
-        often.contains("creep led to the next equilibrium in"),
+        often.contains("viscous control found the equilibrium of"),
         "{often}"
     );
 }
 
-/// Ends a run once creep has led to an equilibrium.
+/// Ends a run once viscous control has led to an equilibrium.
 struct Halts {
     is_over: bool,
     last: Option<f64>,
@@ -374,11 +373,11 @@ impl Watch for Halts {
     }
 }
 
-/// Whoever wants no more, a full disk for one, gets the state of an equilibrium, though creep has committed the
+/// Whoever wants no more, a full disk for one, gets the state of an equilibrium, though viscous control has committed the
 /// states on its way there before the step was taken over.
 #[test]
-fn a_run_that_is_ended_after_creep_has_the_state_of_an_equilibrium() {
-    let source = Source::new("case.toml", punch(OWN, "creep"));
+fn a_run_that_is_ended_after_viscous_control_has_the_state_of_an_equilibrium() {
+    let source = Source::new("case.toml", punch(OWN, "viscous"));
     let file: CaseFile = parse(&source).unwrap();
     let case = Case {
         source,

@@ -346,7 +346,7 @@ control = "arc_length"
     );
     let help = failed.error.help().unwrap();
     assert!(
-        help.contains("`control = \"creep\"` were not tried"),
+        help.contains("`control = \"viscous\"` were not tried"),
         "{help}"
     );
 }

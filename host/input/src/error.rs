@@ -120,27 +120,27 @@ fn hint(error: &mechanics::Error) -> Option<String> {
 
 /// Untried remedies if no equilibrium was found, and the files written by the run.
 fn after_no_equilibrium(none: &NoEquilibrium) -> String {
-    let creep = none.control.relaxes().then_some(if none.crept {
-        "`control = \"creep\"` in [solver], by whole increments, may lead on where short steps do not: what flows on its way \
+    let viscous = none.control.relaxes().then_some(if none.viscous {
+        "`control = \"viscous\"` in [solver], by whole increments, may lead on where short steps do not: what flows on its way \
          stays, so hold the results against those of other increments"
     } else {
-        "`control = \"creep\"` in [solver], which follows the motion to the next equilibrium as a path, may lead on"
+        "`control = \"viscous\"` in [solver], which follows the motion to the next equilibrium as a path, may lead on"
     });
     let ways = match &none.failure.reason {
         reason if none.control == Control::ArcLength && may_have_another_way(reason) => vec![
-            "`control = \"auto\"` in [solver], which relaxes and creeps where the load leads no further, and \
-             `control = \"creep\"` were not tried",
+            "`control = \"auto\"` in [solver], which turns to viscous relaxation and control where the load leads no further, and \
+             `control = \"viscous\"` were not tried",
         ],
         reason if !none.may_move && may_have_another_way(reason) => vec![
-            "`method = \"auto\"` with `relaxation = true` in [solver], with which relaxation and creep lead on where iterations \
+            "`method = \"auto\"` with `relaxation = true` in [solver], with which relaxation and viscous control lead on where iterations \
              stand still, was not tried",
         ],
         Reason::Unmet(Iterations::Newton(_, Some(_)), _) => vec![
-            creep.unwrap_or("other increments may lead on"),
+            viscous.unwrap_or("other increments may lead on"),
             "`convergence = \"force\"` with a force_tolerance of 1e-3 asks for loads in balance alone, where \
              displacements drift",
         ],
-        Reason::Singular(Some((Singularity::Limit, _))) => creep.into_iter().collect(),
+        Reason::Singular(Some((Singularity::Limit, _))) => viscous.into_iter().collect(),
         _ => Vec::new(),
     };
     let bond = none.failure.mechanism.as_ref().and_then(remedy);
@@ -325,7 +325,7 @@ mod tests {
     use mechanics::Place;
     use mechanics::equilibrium::{Criterion, Motion, Unmet};
 
-    const BY_CREEP: &str = "`control = \"creep\"`";
+    const VISCOUSLY: &str = "`control = \"viscous\"`";
     const LIMIT: Reason = Reason::Singular(Some((Singularity::Limit, 0.7)));
 
     fn none(control: Control, reason: Reason) -> NoEquilibrium {
@@ -337,7 +337,7 @@ mod tests {
             reached: 2.5,
             of: 10,
             control,
-            crept: false,
+            viscous: false,
             may_move: true,
             failure: reason.into(),
             runaway: None,
@@ -360,25 +360,25 @@ mod tests {
     }
 
     #[test]
-    fn auto_proposes_creep_that_was_not_tried() {
+    fn auto_proposes_viscous_control_that_was_not_tried() {
         let in_vain = |motion| unmet(Iterations::Newton(25, Some(motion)));
         let relaxed = help(Control::Auto, in_vain(Motion::Relaxation));
-        assert!(relaxed.starts_with(BY_CREEP), "{relaxed}");
+        assert!(relaxed.starts_with(VISCOUSLY), "{relaxed}");
         assert!(relaxed.contains("`convergence = \"force\"`"), "{relaxed}");
-        assert!(help(Control::Auto, LIMIT).starts_with(BY_CREEP));
+        assert!(help(Control::Auto, LIMIT).starts_with(VISCOUSLY));
         // By short steps under `auto`.
         let short = after_no_equilibrium(&NoEquilibrium {
-            crept: true,
-            ..none(Control::Auto, in_vain(Motion::Creep))
+            viscous: true,
+            ..none(Control::Auto, in_vain(Motion::Viscous))
         });
-        assert!(short.starts_with(BY_CREEP), "{short}");
+        assert!(short.starts_with(VISCOUSLY), "{short}");
         assert!(short.contains("by whole increments"), "{short}");
         assert!(!relaxed.contains("by whole increments"), "{relaxed}");
-        let crept = help(Control::Creep, in_vain(Motion::Creep));
-        assert!(!crept.contains(BY_CREEP), "{crept}");
-        assert!(crept.starts_with("other increments"), "{crept}");
+        let viscous = help(Control::Viscous, in_vain(Motion::Viscous));
+        assert!(!viscous.contains(VISCOUSLY), "{viscous}");
+        assert!(viscous.starts_with("other increments"), "{viscous}");
         let written = "results up to the last whole increment";
-        assert!(help(Control::Creep, LIMIT).starts_with(written));
+        assert!(help(Control::Viscous, LIMIT).starts_with(written));
         assert!(help(Control::Auto, Reason::NoState).starts_with(written));
     }
 

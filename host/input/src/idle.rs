@@ -14,9 +14,9 @@ pub(crate) fn choices(case: &Case) -> Vec<String> {
 fn of(solver: &Settings) -> Vec<String> {
     let mut found = Vec::new();
     let method = solver.method.name();
-    if solver.control == Control::Creep && !solver.method.is_newton() {
+    if solver.control == Control::Viscous && !solver.method.is_newton() {
         found.push(format!(
-            "`control = \"creep\"` has no effect with `method = \"{method}\"`: creep leads on where Newton iterations stand \
+            "`control = \"viscous\"` has no effect with `method = \"{method}\"`: viscous control leads on where Newton iterations stand \
              still, with `auto` and `newton`"
         ));
     }
@@ -42,17 +42,17 @@ mod tests {
                 ..Settings::default()
             })
         };
-        let (creep, differences) = (Control::Creep, Tangents::Differences);
+        let (viscous, differences) = (Control::Viscous, Tangents::Differences);
         for method in [Method::Auto, Method::Newton] {
-            assert!(with(method, creep, differences).is_empty(), "{method:?}");
+            assert!(with(method, viscous, differences).is_empty(), "{method:?}");
         }
         for method in [
             Method::ModifiedNewton,
             Method::InitialStress,
             Method::QuasiNewton,
         ] {
-            let said = with(method, creep, Tangents::Auto);
-            assert!(said.len() == 1 && said[0].contains("creep"), "{said:?}");
+            let said = with(method, viscous, Tangents::Auto);
+            assert!(said.len() == 1 && said[0].contains("viscous"), "{said:?}");
             assert!(with(method, Control::Auto, Tangents::Auto).is_empty());
         }
         // Their matrix is made of tangents, renewed seldom.

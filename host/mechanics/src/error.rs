@@ -74,8 +74,8 @@ pub struct NoEquilibrium {
     pub of: usize,
     /// What the settings let lead its steps.
     pub control: Control,
-    /// Under `auto` creep led, by short steps, and led no further.
-    pub crept: bool,
+    /// Under `auto` viscous control led, by short steps, and led no further.
+    pub viscous: bool,
     /// The settings allow viscous relaxation or viscous control if iterations stall.
     pub may_move: bool,
     /// The last attempt: reason, both criteria with residuals, the point that failed.

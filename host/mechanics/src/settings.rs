@@ -196,7 +196,7 @@ pub enum Convergence {
 #[serde(rename_all = "snake_case")]
 pub enum Control {
     /// The load factor, increment by increment; where five steps in a row find no equilibrium, short
-    /// steps of creep to the end of the increment, unless `relaxation` is off.
+    /// steps under viscous control to the end of the increment, unless `relaxation` is off.
     #[default]
     Auto,
     /// The load factor alone: a phase ends where it leads no further.
@@ -204,9 +204,9 @@ pub enum Control {
     /// The load factor; where it leads no further, the arc length of the path of equilibrium, on
     /// which the load may fall and rise again.
     ArcLength,
-    /// The load factor; where Newton iterations stand still, the path of a body that creeps to its next
+    /// The load factor; where Newton iterations stand still, the path of a viscous body on its way to its next
     /// equilibrium, committed step by step.
-    Creep,
+    Viscous,
 }
 
 impl Control {

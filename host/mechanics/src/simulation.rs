@@ -4,7 +4,7 @@
 mod appearing;
 mod beyond;
 mod complete;
-mod creeping;
+mod continuation;
 mod ending;
 mod history;
 mod loads;

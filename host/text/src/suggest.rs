@@ -15,6 +15,9 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .map(|(_, candidate)| candidate)
 }
 
+/// Former names of keys and values, with those of today.
+const FORMER: [(&str, &str); 1] = [("creep", "viscous")];
+
 /// `did you mean …?` and the whole list, for a name that is not among the candidates.
 pub fn suggestion<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str> + Clone) -> String {
     let all: Vec<&str> = candidates.clone().into_iter().collect();
@@ -23,6 +26,10 @@ pub fn suggestion<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str> 
     } else {
         all.join(", ")
     };
+    let is_former = |(former, today): &&(&str, &str)| *former == name && all.contains(today);
+    if let Some((_, today)) = FORMER.iter().find(is_former) {
+        return format!("`{name}` is now called `{today}`. There is: {list}");
+    }
     match nearest(name, candidates) {
         Some(near) => format!("did you mean `{near}`? There is: {list}"),
         None => format!("there is: {list}").replace("there is: there is none", "there is none"),
@@ -39,5 +46,11 @@ mod tests {
         assert_eq!(nearest("youngs_modulus", names), Some("young_modulus"));
         assert_eq!(nearest("cohesion", names), None);
         assert_eq!(nearest("w", ["x", "y"]), None);
+        let hint = suggestion("creep", ["auto", "viscous"]);
+        assert!(
+            hint.starts_with("`creep` is now called `viscous`"),
+            "{hint}"
+        );
+        assert!(suggestion("creep", ["steep"]).starts_with("did you mean"));
     }
 }

@@ -5,7 +5,7 @@
 //! |---|---|
 //! | [`iterate`] | the loop: predict, evaluate, accept, correct |
 //! | [`load`], [`path`] | what it asks: steps to a load factor, steps along the path of equilibrium |
-//! | [`kept`], [`acceleration`], [`relaxation`], [`creep`] | strategies of steps to a load factor |
+//! | [`kept`], [`acceleration`], [`relaxation`], [`viscous_control`] | strategies of steps to a load factor |
 //! | [`line_search`] | how far a correction is followed |
 //! | [`residual`], [`matrix`] | evaluation; assembly, factorisation, solution |
 //! | [`acceptance`] | when a state counts as equilibrium, of numbers alone |
@@ -18,7 +18,6 @@
 mod acceleration;
 mod acceptance;
 mod cause;
-mod creep;
 mod failure;
 mod given;
 mod iterate;
@@ -33,6 +32,7 @@ mod relaxation;
 mod residual;
 mod round_off;
 mod verdict;
+mod viscous_control;
 
 pub use failure::{
     Criterion, Culprit, DomainFailure, Imbalance, Iterations, Motion, PointPlace, Reason, Runaway,
@@ -123,8 +123,8 @@ pub struct Newton<'a> {
     /// evaluations.
     displacement: Vec<f64>,
     force: Vec<f64>,
-    /// Viscous steps of creep are single corrections.
-    creeps_singly: bool,
+    /// Viscous steps under viscous control are single corrections.
+    takes_single_corrections: bool,
     /// Who may want to stop the step, and when it was last asked for.
     stop: Stop,
     asked: Instant,
@@ -160,7 +160,7 @@ impl<'a> Newton<'a> {
             base: None,
             displacement: vec![0.0; system.n_dofs()],
             force: vec![0.0; system.n_dofs()],
-            creeps_singly: false,
+            takes_single_corrections: false,
             stop: Stop::never(),
             asked: Instant::now(),
         }
@@ -173,10 +173,10 @@ impl<'a> Newton<'a> {
         self
     }
 
-    /// The same iterations, with viscous steps of creep that are single corrections, or not.
+    /// The same iterations, with viscous steps under viscous control that are single corrections, or not.
     #[must_use]
-    pub fn creeping_singly(mut self, singly: bool) -> Self {
-        self.creeps_singly = singly;
+    pub fn taking_single_corrections(mut self, singly: bool) -> Self {
+        self.takes_single_corrections = singly;
         self
     }
 
@@ -273,9 +273,9 @@ impl<'a> Newton<'a> {
         self.end(outcome.is_ok());
         match outcome {
             Ok(equilibrium) => {
-                let creep = &control.creep;
-                let relaxed = control.relaxation.is_under_way() || creep.has_arrived();
-                let was_motion = creep.lets_expect_another();
+                let viscous = &control.viscous;
+                let relaxed = control.relaxation.is_under_way() || viscous.has_arrived();
+                let was_motion = viscous.lets_expect_another();
                 let open = self.open(&equilibrium.state.balance, &iterations);
                 Ok(StepSuccess {
                     was_kept: self.keeps(),

@@ -57,9 +57,9 @@ impl Simulation {
             reached: lambda * of as f64,
             of,
             control: settings.control,
-            crept: phase.record.crept_from.is_some(),
+            viscous: phase.record.viscous_from.is_some(),
             may_move: settings.method.is_newton()
-                && (settings.relaxation || settings.control == Control::Creep),
+                && (settings.relaxation || settings.control == Control::Viscous),
             failure,
             runaway: None,
         }

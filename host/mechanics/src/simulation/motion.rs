@@ -1,7 +1,7 @@
 //! How far from each other two ways lead that a step may take.
 //!
-//! Motions that led to equilibrium, viscous relaxation or creep, are counted, and the first of each kind is told: where
-//! relaxation has found an equilibrium, Newton iterations from the tangent, and creep where they stand still, may find another
+//! Motions that led to equilibrium, viscous relaxation or viscous control, are counted, and the first of each kind is told: where
+//! relaxation has found an equilibrium, Newton iterations from the tangent, and viscous control where they stand still, may find another
 //! one. If steps are cut back, iterations choose the steps: two halves of a step end elsewhere than the whole.
 
 use super::phase::PhaseEquations;
@@ -16,8 +16,8 @@ use serde::{Deserialize, Serialize};
 /// Another way that a step is tried on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Trial {
-    /// From its tangent, by creep where Newton iterations stand still.
-    Creep,
+    /// From its tangent, under viscous control where Newton iterations stand still.
+    Viscous,
     /// In two halves, by the load alone.
     Halves,
 }
@@ -49,14 +49,14 @@ impl Simulation {
         watch: &mut dyn Watch,
     ) {
         phase.record.relaxed += 1;
-        if control == Control::Creep {
-            phase.record.crept += 1;
-            if phase.record.crept == 1 && self.problem.settings.control == Control::Creep {
-                watch.warning(&Warning::Crept(place.clone()));
+        if control == Control::Viscous {
+            phase.record.viscous += 1;
+            if phase.record.viscous == 1 && self.problem.settings.control == Control::Viscous {
+                watch.warning(&Warning::Viscous(place.clone()));
             }
-        } else if phase.record.relaxed - phase.record.crept == 1 {
-            let by_creep = self.neighbour(phase, success, step, Trial::Creep);
-            watch.warning(&Warning::Relaxed(place.clone(), by_creep));
+        } else if phase.record.relaxed - phase.record.viscous == 1 {
+            let by_viscous_control = self.neighbour(phase, success, step, Trial::Viscous);
+            watch.warning(&Warning::Relaxed(place.clone(), by_viscous_control));
         }
     }
 
@@ -101,8 +101,8 @@ impl Simulation {
         let here = self.forces(equations, Group::add_trial_forces);
         let aside: Vec<Aside> = self.groups.iter_mut().map(Group::put_aside).collect();
         let settings = match trial {
-            Trial::Creep => Settings {
-                control: Control::Creep,
+            Trial::Viscous => Settings {
+                control: Control::Viscous,
                 ..self.settings()
             },
             Trial::Halves => Settings {
@@ -126,7 +126,7 @@ impl Simulation {
         .stopped_by(&self.stop);
         let (loads, history) = (&phase.course.loads, &phase.course.history);
         let other = match trial {
-            Trial::Creep => newton.step(loads, [from, to], clock, None),
+            Trial::Viscous => newton.step(loads, [from, to], clock, None),
             Trial::Halves => {
                 let guess = history.guess(0.5 * (to - from));
                 newton.step_in_halves(loads, [from, to], clock, guess)

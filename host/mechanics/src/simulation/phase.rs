@@ -184,8 +184,8 @@ impl Simulation {
         if record.relaxed > 1 {
             watch.warning(&Warning::RelaxedOften {
                 phase: record.name.clone(),
-                relaxed: record.relaxed - record.crept,
-                crept: record.crept,
+                relaxed: record.relaxed - record.viscous,
+                viscous: record.viscous,
             });
         }
         if record.tolerated > 1 {

@@ -29,11 +29,11 @@ pub struct PhaseRecord {
     pub halved: usize,
     /// Steps with results that a law calls inaccurate.
     pub unreliable: usize,
-    /// Steps that a motion led to equilibrium: viscous relaxation, or creep.
+    /// Steps that a motion led to equilibrium: viscous relaxation, or viscous control.
     pub relaxed: usize,
-    /// Those of them that creep did.
+    /// Those of them that viscous control did.
     #[serde(default)]
-    pub crept: usize,
+    pub viscous: usize,
     /// Steps whose residual was tolerated above the tolerance.
     pub tolerated: usize,
     /// The largest of these residuals, relative.
@@ -52,9 +52,9 @@ pub struct PhaseRecord {
     pub unsettled: f64,
     /// Steps along the path of equilibrium under arc-length control.
     pub arc_length: usize,
-    /// The first increment, from 1, in which creep led under `auto`, as steps by the load found no equilibrium.
-    pub crept_from: Option<usize>,
-    /// The first increment, from 1, in which creep led by single corrections, as nothing else found an equilibrium.
+    /// The first increment, from 1, in which viscous control led under `auto`, as steps by the load found no equilibrium.
+    pub viscous_from: Option<usize>,
+    /// The first increment, from 1, in which viscous control led by single corrections, as nothing else found an equilibrium.
     #[serde(default)]
     pub singly_from: Option<usize>,
     /// Matrices factorised.

@@ -1,7 +1,7 @@
 //! Steps from equilibrium to equilibrium up to the end of an increment: how long they are, and what follows where
 //! one finds none.
 
-use super::creeping::{self, Lead};
+use super::continuation::{self, Lead};
 use super::path::PathEnd;
 use super::{Simulation, UnderWay, Warning, Watch, go_on, stopped};
 use crate::equilibrium::{Guess, Newton, StepFailure, StepSuccess};
@@ -50,9 +50,9 @@ enum Then {
     Shorter,
     /// The path of equilibrium, on which the load may fall.
     Path,
-    /// Creep, which leads from here on.
-    Creep,
-    /// Creep by single corrections, from here on, with a first step of this length.
+    /// Viscous control, which leads from here on.
+    Viscous,
+    /// Viscous control by single corrections, from here on, with a first step of this length.
     Singly(f64),
     /// Nothing.
     End,
@@ -123,7 +123,7 @@ impl Simulation {
     }
 
     /// Goes on from a step that found none: once more with other tangents, with a shorter one, along the path of
-    /// equilibrium, by creep.
+    /// equilibrium, under viscous control.
     ///
     /// # Errors
     /// There is no way on, or whoever watches wants no more.
@@ -169,18 +169,18 @@ impl Simulation {
                 phase.course.step = step;
                 if phase.record.singly_from.is_none() {
                     phase.record.singly_from = Some(place.increment);
-                    watch.warning(&Warning::CreepsSingly(place.clone()));
+                    watch.warning(&Warning::SingleCorrections(place.clone()));
                 }
                 Ok(())
             }
-            Then::Creep => {
+            Then::Viscous => {
                 way.was_cut = false;
                 if !way.lead.was_in_vain() {
-                    phase.course.step = creeping::LONGEST / way.n as f64;
+                    phase.course.step = continuation::LONGEST / way.n as f64;
                 }
-                if phase.record.crept_from.is_none() {
-                    phase.record.crept_from = Some(place.increment);
-                    watch.warning(&Warning::Creeps(place.clone()));
+                if phase.record.viscous_from.is_none() {
+                    phase.record.viscous_from = Some(place.increment);
+                    watch.warning(&Warning::TurnedViscous(place.clone()));
                 }
                 Ok(())
             }
@@ -198,7 +198,7 @@ impl Simulation {
         // Where it has led before, nothing else is tried first.
         let again = phase.record.singly_from.is_some() && way.lead.has_waited();
         let turns = !stays && !again && way.lead.turns(failure, is_out);
-        let is_over = is_out && !stays && !(turns && way.lead.creeps());
+        let is_over = is_out && !stays && !(turns && way.lead.is_viscous());
         let is_over = is_over || way.lead.is_at_its_end(step * n);
         if failure.defect().is_some() {
             Then::End
@@ -209,8 +209,8 @@ impl Simulation {
             && let Some(step) = way.lead.begins_singly(failure, way.smallest, n)
         {
             Then::Singly(step)
-        } else if turns && way.lead.creeps() {
-            Then::Creep
+        } else if turns && way.lead.is_viscous() {
+            Then::Viscous
         } else if is_over {
             Then::End
         } else {
@@ -245,7 +245,7 @@ impl Simulation {
         done: &mut Progress,
     ) -> Result<(), Error> {
         let iterations = success.iterations.len();
-        // Whoever wants no more has the state of this equilibrium: creep has committed its way to it.
+        // Whoever wants no more has the state of this equilibrium: viscous control has committed its way to it.
         let flow = watch.iterations(place, lambda, &success.iterations);
         done.iterations += iterations;
         let record = &mut phase.record;
@@ -314,7 +314,9 @@ impl Simulation {
             &settings,
             &mut phase.record.costs,
         );
-        newton = newton.stopped_by(&self.stop).creeping_singly(singly);
+        newton = newton
+            .stopped_by(&self.stop)
+            .taking_single_corrections(singly);
         newton.step(&phase.course.loads, [from, to], clock, guess)
     }
 }
@@ -324,7 +326,7 @@ impl Way<'_> {
     fn longest(&self, phase: &UnderWay) -> f64 {
         let step = phase.course.step;
         if self.lead.is_short() {
-            step.min(creeping::LONGEST / self.n as f64)
+            step.min(continuation::LONGEST / self.n as f64)
         } else {
             step
         }

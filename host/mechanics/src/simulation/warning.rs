@@ -56,8 +56,8 @@ pub enum Warning {
     Relaxed(Place, Option<Neighbour>),
     /// Steps of an increment were cut back; where two halves of a shorter one lead, the first of its phase that lead elsewhere.
     CutBack(Place, Neighbour),
-    /// Creep, which the settings ask for, did so.
-    Crept(Place),
+    /// Viscous control, which the settings ask for, did so.
+    Viscous(Place),
     /// Nodes that stand apart move alike, and are prescribed to be at one place.
     LedTogether {
         /// The phase.
@@ -74,7 +74,7 @@ pub enum Warning {
         /// Steps with viscous relaxation.
         relaxed: usize,
         /// Steps under viscous control.
-        crept: usize,
+        viscous: usize,
     },
     /// Number of steps of a phase with tolerated residuals.
     ToleratedOften {
@@ -116,10 +116,10 @@ pub enum Warning {
     TookOver(String, TakeOver),
     /// A law could not be asked that; this is what it says.
     Unasked(String, String),
-    /// Steps of the load found no equilibrium: creep leads from here on.
-    Creeps(Place),
-    /// Nothing else found an equilibrium either: creep leads by single corrections from here on.
-    CreepsSingly(Place),
+    /// Steps of the load found no equilibrium: viscous control leads from here on.
+    TurnedViscous(Place),
+    /// Nothing else found an equilibrium either: viscous control leads by single corrections from here on.
+    SingleCorrections(Place),
     /// The path of equilibrium was followed, from one load factor, between two others.
     FollowedPath {
         /// The increment.
@@ -140,6 +140,10 @@ impl Warning {
     }
 }
 
+/// Advice after viscous control.
+const COMPARE: &str =
+    "Plastic flow on its way stays in the state: compare with a run with more increments";
+
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -148,8 +152,7 @@ impl fmt::Display for Warning {
             Self::Torn(place, torn) => write!(f, "{place}: {torn}"),
             Self::Approximate(law) => write!(
                 f,
-                "the tangents of law `{law}` are approximate: they are made by differences of its \
-                 stresses instead"
+                "law `{law}` declares its tangents approximate: differences of its stresses replace them"
             ),
             Self::NoDerivative { group, law, notice } => write!(
                 f,
@@ -157,7 +160,7 @@ impl fmt::Display for Warning {
             ),
             Self::NoTime { phase, law, by } => write!(
                 f,
-                "law `{law}`{by} depends on the time, and phase `{phase}` says none: it takes 1"
+                "phase `{phase}` has no `time`, and law `{law}`{by} depends on time: the phase takes 1"
             ),
             Self::RoundOff {
                 phase,
@@ -165,10 +168,10 @@ impl fmt::Display for Warning {
                 left,
             } => write!(
                 f,
-                "phase `{phase}`: `force_tolerance` {tolerance:.1e} is below round-off: a residual of \
-                 {left:.1e} is left, which is the last bit of the displacements"
+                "phase `{phase}`: `force_tolerance` {tolerance:.1e} is below round-off: the residual stays at {left:.1e}, the last \
+                 bit of the displacements"
             ),
-            Self::Relaxed(place, by_creep) => relaxed(f, place, *by_creep),
+            Self::Relaxed(place, by_viscous_control) => relaxed(f, place, *by_viscous_control),
             Self::CutBack(place, in_halves) => cut_back(f, place, *in_halves),
             Self::Unsettled {
                 phase,
@@ -180,16 +183,15 @@ impl fmt::Display for Warning {
                  tolerance, and what is left of them is the last bit of the displacements; last corrections are up to \
                  {left:.1e} of the increment"
             ),
-            Self::Crept(place) => write!(
+            Self::Viscous(place) => write!(
                 f,
-                "{place}: Newton iterations came to a standstill; creep led to the next equilibrium; what flows on its way \
-                 stays, so that others may lie near: hold the results against those of other increments"
+                "{place}: Newton iterations stalled; viscous control found the next equilibrium. {COMPARE}"
             ),
             Self::RelaxedOften {
                 phase,
                 relaxed,
-                crept,
-            } => motions(f, phase, *relaxed, *crept),
+                viscous,
+            } => motions(f, phase, *relaxed, *viscous),
             Self::ToleratedOften {
                 phase,
                 steps,
@@ -197,8 +199,7 @@ impl fmt::Display for Warning {
                 force,
             } => write!(
                 f,
-                "phase `{phase}`: a residual was tolerated in {steps} steps in all, at most {largest:.1e}, \
-                 a force of {force:.1e}"
+                "phase `{phase}`: {steps} steps have a tolerated residual, at most {largest:.1e} of the forces in play, {force:.1e} kN"
             ),
             Self::Tolerated {
                 place,
@@ -228,17 +229,16 @@ impl fmt::Display for Warning {
                 "phase `{phase}`: {reason}\n  over a nil increment, so that what the law makes of the \
                  stresses it finds comes in the first increment, unannounced"
             ),
-            Self::Creeps(place) => write!(
+            Self::TurnedViscous(place) => write!(
                 f,
-                "{place}: shorter and shorter steps of the load found no equilibrium; by short steps creep is tried to the \
-                 end of the increment; what flows on its way stays, so that others may lie near: hold the results \
-                 against those of other increments"
+                "{place}: shorter and shorter load steps found no equilibrium; viscous control takes short steps to the end \
+                 of the increment. {COMPARE}"
             ),
-            Self::CreepsSingly(place) => write!(
+            Self::SingleCorrections(place) => write!(
                 f,
-                "{place}: nothing found an equilibrium, as it is where bonds break: creep by single corrections is tried, after which \
-                 what has broken stays so; which points break can depend on the steps: hold the results against those of \
-                 other increments"
+                "{place}: nothing else found an equilibrium, as where bonds break; viscous control takes single corrections, so \
+                 that broken bonds stay broken. Which bonds break can depend on the steps: compare with a run with more \
+                 increments"
             ),
             Self::FollowedPath {
                 place,
@@ -258,44 +258,45 @@ fn tolerated(
     place: &Place,
     [residual, force, tolerance]: [f64; 3],
 ) -> fmt::Result {
-    const UNCERTAIN: &str = "displacements are uncertain by up to a tenth of the increment";
+    const UNCERTAIN: &str = "Displacements are uncertain by up to a tenth of the increment";
     if residual <= tolerance {
         return write!(
             f,
-            "{place}: iterations came to a standstill: the residual, {residual:.1e}, is within its tolerance, corrections \
-             stay above `displacement_tolerance`; `tolerated_residual` accepts it; {UNCERTAIN}"
+            "{place}: iterations stalled; the residual, {residual:.1e}, is within its tolerance, but corrections stay above \
+             `displacement_tolerance`. {UNCERTAIN}"
         );
     }
     write!(
         f,
-        "{place}: iterations came to a standstill short of the tolerances, with a residual of {residual:.1e} \
-         ({tolerance:.1e} asked for); `tolerated_residual` accepts it: of all forces in play that share is out of \
-         balance, {force:.1e} (2-norm over the nodes; hold it against the loads asked for); {UNCERTAIN}"
+        "{place}: iterations stalled at a residual of {residual:.1e} (tolerance {tolerance:.1e}), which `tolerated_residual` \
+         accepts: {force:.1e} kN are out of balance (2-norm over the nodes). Compare this force with your loads. {UNCERTAIN}"
     )
 }
 
 fn by_force(f: &mut fmt::Formatter<'_>, phase: &str, steps: usize, open: &Open) -> fmt::Result {
     write!(
         f,
-        "phase `{phase}`: equilibrium by forces alone in {steps} steps: residuals of at most {:.1e} of all forces in \
-         play, which is a force of {:.1e} (2-norm over the nodes; hold it against the loads asked for: they are known \
-         no better), last corrections of at most {:.1e} of their increment, at most {} nodes out of balance by more \
-         than the tolerance",
+        "phase `{phase}`: {steps} steps are in equilibrium by forces alone, with residuals of at most {:.1e} of the forces in \
+         play, {:.1e} kN (2-norm over the nodes). Loads are known to that force. Last corrections are at most {:.1e} of the \
+         increment; at most {} nodes exceed the tolerance",
         open.residual, open.force, open.correction, open.nodes
     )
 }
 
-fn motions(f: &mut fmt::Formatter<'_>, phase: &str, relaxed: usize, crept: usize) -> fmt::Result {
+fn motions(f: &mut fmt::Formatter<'_>, phase: &str, relaxed: usize, viscous: usize) -> fmt::Result {
     let steps = |n: usize| match n {
         1 => "1 step".to_owned(),
         n => format!("{n} steps"),
     };
-    let of = [("viscous relaxation", relaxed), ("creep", crept)];
+    let of = [
+        ("viscous relaxation", relaxed),
+        ("viscous control", viscous),
+    ];
     let told = of.iter().filter(|(_, n)| *n > 0);
     let told: Vec<String> = told
-        .map(|(by, n)| format!("{by} led to the next equilibrium in {}", steps(*n)))
+        .map(|(by, n)| format!("{by} found the equilibrium of {}", steps(*n)))
         .collect();
-    write!(f, "phase `{phase}`: {} in all", told.join(", "))
+    write!(f, "phase `{phase}`: {}", told.join(", "))
 }
 
 fn out_of_balance(f: &mut fmt::Formatter<'_>, phase: &str, share: f64) -> fmt::Result {
@@ -313,8 +314,7 @@ fn out_of_balance(f: &mut fmt::Formatter<'_>, phase: &str, share: f64) -> fmt::R
 fn cut_back(f: &mut fmt::Formatter<'_>, place: &Place, in_halves: Neighbour) -> fmt::Result {
     write!(
         f,
-        "{place}: steps were cut back; which ones are can depend on last bits (another unit, order of groups, mirror image), and \
-         results depend on the steps taken: "
+        "{place}: steps were cut back, and results depend on the steps: two halves of one step "
     )?;
     match in_halves {
         Neighbour::Apart {
@@ -322,55 +322,47 @@ fn cut_back(f: &mut fmt::Formatter<'_>, place: &Place, in_halves: Neighbour) -> 
             forces,
         } => write!(
             f,
-            "two halves of a shorter one lead {displacements:.1e} of its displacements and {forces:.1e} of its changes of \
-             forces away"
+            "differ from the whole by {displacements:.1e} of its displacements and {forces:.1e} of its changes of forces"
         )?,
-        Neighbour::None => write!(f, "two halves of a shorter one lead to no equilibrium")?,
+        Neighbour::None => write!(f, "find no equilibrium")?,
     }
-    write!(
-        f,
-        "; run it with more increments and hold the results against each other"
-    )
+    write!(f, ". Compare with a run with more increments")
 }
 
-fn relaxed(f: &mut fmt::Formatter<'_>, place: &Place, by_creep: Option<Neighbour>) -> fmt::Result {
-    write!(
-        f,
-        "{place}: Newton iterations came to a standstill; viscous relaxation led to the next equilibrium"
-    )?;
-    let other = "from its tangent, by creep where need be, the same step leads to";
-    if let Some(Neighbour::Apart {
-        displacements,
-        forces,
-    }) = by_creep
-        && by_creep.is_some_and(Neighbour::is_the_same)
-    {
-        return write!(
-            f,
-            ": {other} the same one, within {displacements:.1e} of its displacements and {forces:.1e} of its changes of \
-             forces"
-        );
-    }
-    write!(
-        f,
-        "; others may lie near, and which one is found depends on the course of the relaxation"
-    )?;
-    match by_creep {
+fn relaxed(
+    f: &mut fmt::Formatter<'_>,
+    place: &Place,
+    by_viscous_control: Option<Neighbour>,
+) -> fmt::Result {
+    let found = "Newton iterations stalled; viscous relaxation found";
+    match by_viscous_control {
+        Some(Neighbour::Apart {
+            displacements,
+            forces,
+        }) if by_viscous_control.is_some_and(Neighbour::is_the_same) => {
+            return write!(
+                f,
+                "{place}: {found} the next equilibrium, which is unique to {:.1e}",
+                displacements.max(forces)
+            );
+        }
         Some(Neighbour::Apart {
             displacements,
             forces,
         }) => write!(
             f,
-            ": {other} one that is {displacements:.1e} of its displacements and {forces:.1e} of its changes of forces \
-             away"
+            "{place}: {found} an equilibrium; viscous control finds one that differs by {displacements:.1e} of the step's \
+             displacements and {forces:.1e} of its changes of forces"
         )?,
-        Some(Neighbour::None) => write!(f, ": {other} none")?,
-        None => {}
+        Some(Neighbour::None) => write!(
+            f,
+            "{place}: {found} an equilibrium; viscous control finds none"
+        )?,
+        None => write!(f, "{place}: {found} an equilibrium; others may be near")?,
     }
     write!(
         f,
-        "; run it with other increments, or with another `control` (`load`, `creep`), and hold the results against \
-         each other"
+        ". Compare with a run with other increments, or with `control = \"load\"` or `\"viscous\"`"
     )
 }
 
@@ -393,10 +385,10 @@ mod tests {
             };
             warning.to_string()
         };
-        assert!(tolerated(1e-5).contains("of all forces in play that share is out of balance"));
+        assert!(tolerated(1e-5).contains("1.0e0 kN are out of balance"));
         let within = tolerated(9.9e-12);
         assert!(
-            within.contains("is within its tolerance, corrections stay above"),
+            within.contains("is within its tolerance, but corrections stay above"),
             "{within}"
         );
         assert!(!within.contains("out of balance"), "{within}");
@@ -415,7 +407,8 @@ mod tests {
 
     #[test]
     fn another_equilibrium_is_spoken_of_where_another_way_leads_to_one() {
-        let of = |by_creep| Warning::Relaxed(Place::default(), by_creep).to_string();
+        let of =
+            |by_viscous_control| Warning::Relaxed(Place::default(), by_viscous_control).to_string();
         let apart = |displacements, forces| {
             of(Some(Neighbour::Apart {
                 displacements,
@@ -423,24 +416,15 @@ mod tests {
             }))
         };
         let same = apart(3e-13, 2e-8);
-        assert!(
-            same.ends_with(
-                "within 3.0e-13 of its displacements and 2.0e-8 of its changes of forces"
-            ),
-            "{same}"
-        );
-        assert!(!same.contains("others may lie near"), "{same}");
+        assert!(same.ends_with("which is unique to 2.0e-8"), "{same}");
         for other in [
             apart(3e-13, 2e-5),
             apart(2e-3, 0.0),
             of(Some(Neighbour::None)),
             of(None),
         ] {
-            assert!(other.contains("others may lie near"), "{other}");
-            assert!(
-                other.contains("hold the results against each other"),
-                "{other}"
-            );
+            assert!(other.contains("an equilibrium; "), "{other}");
+            assert!(other.contains("Compare with a run"), "{other}");
         }
     }
 
@@ -452,28 +436,28 @@ mod tests {
             forces: 5e-4,
         });
         assert!(
-            apart.contains("lead 2.0e-3 of its displacements and 5.0e-4 of its changes"),
+            apart.contains("by 2.0e-3 of its displacements and 5.0e-4 of its changes"),
             "{apart}"
         );
         let none = of(Neighbour::None);
-        assert!(none.contains("lead to no equilibrium"), "{none}");
+        assert!(none.contains("find no equilibrium"), "{none}");
     }
 
     #[test]
     fn motions_are_counted_by_what_they_are() {
-        let of = |relaxed, crept| {
+        let of = |relaxed, viscous| {
             let phase = "push".to_owned();
             let warning = Warning::RelaxedOften {
                 phase,
                 relaxed,
-                crept,
+                viscous,
             };
             warning.to_string()
         };
-        let relaxed = "viscous relaxation led to the next equilibrium in 3 steps";
-        let crept = "creep led to the next equilibrium in 1 step";
-        assert_eq!(of(3, 0), format!("phase `push`: {relaxed} in all"));
-        assert_eq!(of(0, 1), format!("phase `push`: {crept} in all"));
-        assert_eq!(of(3, 1), format!("phase `push`: {relaxed}, {crept} in all"));
+        let relaxed = "viscous relaxation found the equilibrium of 3 steps";
+        let viscous = "viscous control found the equilibrium of 1 step";
+        assert_eq!(of(3, 0), format!("phase `push`: {relaxed}"));
+        assert_eq!(of(0, 1), format!("phase `push`: {viscous}"));
+        assert_eq!(of(3, 1), format!("phase `push`: {relaxed}, {viscous}"));
     }
 }

@@ -59,7 +59,7 @@ pub(super) const SOLVER_CHOICES: &[SolverChoice] = &[
     choice("line_search", "false", |s| s.line_search = false),
     choice("control", "auto", |s| s.control = Control::Auto),
     choice("control", "load", |s| s.control = Control::Load),
-    choice("control", "creep", |s| s.control = Control::Creep),
+    choice("control", "viscous", |s| s.control = Control::Viscous),
     choice("convergence", "both", |s| {
         s.convergence = Convergence::Both;
     }),

@@ -56,8 +56,8 @@ pub enum Singularity {
 pub enum Motion {
     /// Viscous relaxation.
     Relaxation,
-    /// Creep.
-    Creep,
+    /// Viscous control.
+    Viscous,
 }
 
 /// Which iterations came to an end short of equilibrium.

@@ -1,16 +1,16 @@
 //! Steps whose load factor is given: the strategies of Newton's method under load control.
 //!
-//! A standstill is [relaxed](super::relaxation) or [crept](super::creep) away; a [kept matrix](super::kept) is tried before that of
+//! A standstill is [relaxed](super::relaxation) or [viscous](super::viscous_control) away; a [kept matrix](super::kept) is tried before that of
 //! the present state; slow corrections are [accelerated](super::acceleration).
 
 use super::acceleration::Acceleration;
-use super::creep::Creep;
 use super::failure::{Motion, StepFailure};
 use super::iterate::{Control, Correction, State};
 use super::line_search::{LineSearch, Otherwise};
 use super::outcome::Iteration;
 use super::relaxation::{self, Relaxation};
 use super::residual::Task;
+use super::viscous_control::ViscousControl;
 use super::{Newton, norm};
 use crate::settings::Method;
 use law::Operator;
@@ -33,7 +33,7 @@ pub(super) struct LoadControl {
     /// With a quasi-Newton matrix, and with others as long as slow corrections do.
     acceleration: Option<Acceleration>,
     pub(super) relaxation: Relaxation,
-    pub(super) creep: Creep,
+    pub(super) viscous: ViscousControl,
     /// The first iterate, where it did not come from the tangent.
     first: Option<Vec<f64>>,
     /// Displacement increments that left the least out of balance, and how much, relative.
@@ -60,7 +60,7 @@ impl LoadControl {
             guess,
             acceleration: is_slow.then(Acceleration::default),
             relaxation: Relaxation::new(newton.settings),
-            creep: Creep::new(newton.settings, is_expected),
+            viscous: ViscousControl::new(newton.settings, is_expected),
             least: None,
             first: None,
             predicted: None,
@@ -101,7 +101,7 @@ impl Control for LoadControl {
             },
         };
         newton.starts_from(&increment, from_tangent);
-        if !from_tangent && self.creep.is_wanted() {
+        if !from_tangent && self.viscous.is_wanted() {
             self.first = Some(increment.clone());
         }
         let operator = newton.operator();
@@ -128,7 +128,7 @@ impl Control for LoadControl {
         state: &State,
         iterations: &[Iteration],
     ) -> Option<f64> {
-        if self.creep.has_arrived() {
+        if self.viscous.has_arrived() {
             return Some(0.0);
         }
         if newton.is_equilibrium(&state.balance, iterations.last()?) {
@@ -176,8 +176,8 @@ impl Control for LoadControl {
     }
 
     fn series<'i>(&self, iterations: &'i [Iteration]) -> &'i [Iteration] {
-        if self.creep.is_wanted() {
-            self.creep.series(iterations)
+        if self.viscous.is_wanted() {
+            self.viscous.series(iterations)
         } else {
             self.relaxation.series(iterations)
         }
@@ -232,8 +232,8 @@ impl Control for LoadControl {
         iterations: &[Iteration],
     ) -> StepFailure {
         let correction = iterations.last().and_then(|last| last.correction);
-        let in_vain = if self.creep.was_in_vain() {
-            Some(Motion::Creep)
+        let in_vain = if self.viscous.was_in_vain() {
+            Some(Motion::Viscous)
         } else {
             let in_vain = self.relaxation.was_in_vain();
             in_vain.then_some(Motion::Relaxation)
@@ -247,7 +247,7 @@ impl Control for LoadControl {
 impl LoadControl {
     /// Whether a motion may lead away from a state that no correction can be computed for.
     fn is_at_hand(&self) -> bool {
-        self.creep.is_at_hand() || self.relaxation.is_at_hand()
+        self.viscous.is_at_hand() || self.relaxation.is_at_hand()
     }
 
     /// The state that a motion leads to where Newton iterations get on no further. `None` where they do.
@@ -264,9 +264,12 @@ impl LoadControl {
             rise,
             balance,
         };
-        if self.creep.is_due(iterations, is_singular) {
+        if self.viscous.is_due(iterations, is_singular) {
             let first = self.first.as_deref();
-            if let Some(reached) = self.creep.relieve(newton, &self.task, first, iterations)? {
+            if let Some(reached) = self
+                .viscous
+                .relieve(newton, &self.task, first, iterations)?
+            {
                 return Ok(Some(at(reached)));
             }
             // Newton iterations go on where they stood.
@@ -305,7 +308,7 @@ impl LoadControl {
             self.acceleration = goes_on.then(|| Acceleration::since(here));
             if !goes_on {
                 self.relaxation.starts_at(here);
-                self.creep.starts_at(here);
+                self.viscous.starts_at(here);
             }
         }
         if let Some((taken, next)) = newton.correct_with_kept(self, state, &self.task)? {

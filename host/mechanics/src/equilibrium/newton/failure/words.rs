@@ -39,7 +39,7 @@ impl fmt::Display for Iterations {
             Self::Newton(n, in_vain) => {
                 let tried = match in_vain {
                     Some(Motion::Relaxation) => ", nor by viscous relaxation",
-                    Some(Motion::Creep) => ", nor by creep",
+                    Some(Motion::Viscous) => ", nor under viscous control",
                     None => "",
                 };
                 write!(f, "no equilibrium after {n} iterations{tried}")
@@ -66,8 +66,7 @@ impl fmt::Display for Reason {
                     }
                     Some((Singularity::Limit, lambda)) => write!(
                         f,
-                        ", the elastic one is not: no tangent leads beyond load factor {lambda:.3e} of the phase (a \
-                         collapse load, a mechanism, or laws that are singular short of one)"
+                        " at {lambda:.3e} of the phase, the elastic one is not: a collapse load or a mechanism"
                     ),
                     Some((Singularity::Unknown, _)) | None => Ok(()),
                 }

@@ -1,4 +1,4 @@
-//! Creep: from a step that Newton iterations cannot finish to an equilibrium, on the path of a body that comes to rest.
+//! Viscous control: from a step that Newton iterations cannot finish to an equilibrium, on the path of a body that comes to rest.
 //!
 //! As in [viscous relaxation](super::relaxation) a real body's motion to the next stable equilibrium is
 //! followed where no branch of equilibria goes on. There one increment is tried again and again
@@ -14,7 +14,7 @@
 //!
 //! with the step's change Δf of the forces in the first one and none afterwards, while the body
 //! comes to rest. Every viscous step is solved and **its state committed**: laws see the path of a
-//! body that creeps to its equilibrium, not one increment tried again and again. Above
+//! viscous body to its equilibrium, not one increment tried again and again. Above
 //! α = (1/cos θ − 1)/2, θ the angle between yield and flow in energy, a step's matrix is positive definite
 //! and its answer the only one; if a viscous step is linear, nothing yields or unloads any more,
 //! and α falls, finally to zero: a Newton correction. The same tolerances decide. The accepted
@@ -68,7 +68,7 @@ const SHORT: usize = 3;
 
 /// Statistics of viscous control in a step.
 #[derive(Debug)]
-pub(super) struct Creep {
+pub(super) struct ViscousControl {
     course: Course,
     /// The last step was a motion: this one begins with it.
     is_expected: bool,
@@ -113,11 +113,11 @@ struct Went {
     is_repeated: bool,
 }
 
-impl Creep {
+impl ViscousControl {
     /// The outcome of a step to a given load factor, after a motion or not.
     pub(super) fn new(settings: &Settings, is_expected: bool) -> Self {
         // Methods that keep their matrix are slow without having come to an end.
-        let is_wanted = settings.control == Control::Creep && settings.method.is_newton();
+        let is_wanted = settings.control == Control::Viscous && settings.method.is_newton();
         Self {
             course: if is_wanted {
                 Course::Ready
@@ -186,7 +186,9 @@ impl Creep {
     ) -> Result<Option<(Vec<f64>, Balance)>, StepFailure> {
         let so_many = iterations.len();
         let committed = newton.committed();
-        if let Ok((steps, increment, balance)) = newton.creep(task, first, iterations) {
+        if let Ok((steps, increment, balance)) =
+            newton.follow_viscous_motion(task, first, iterations)
+        {
             self.course = Course::Arrived(steps);
             return Ok(Some((increment, balance)));
         }
@@ -205,18 +207,18 @@ impl Newton<'_> {
     ///
     /// # Errors
     /// The residual did not fall, or a law or the equations failed.
-    fn creep(
+    fn follow_viscous_motion(
         &mut self,
         task: &Task,
         guess: Option<&[f64]>,
         iterations: &mut Vec<Iteration>,
     ) -> Result<(usize, Vec<f64>, Balance), StepFailure> {
-        let mut motion = self.start_creep(task, guess)?;
+        let mut motion = self.start_viscous_motion(task, guess)?;
         let mut balance = self.evaluate(&motion.increment, task, Operator::Consistent)?;
         let mut residuals: Vec<f64> = Vec::new();
         for step in 1..=MAX_STEPS {
             let before = balance.relative;
-            let went = if self.creeps_singly {
+            let went = if self.takes_single_corrections {
                 self.single_correction(&mut motion, &mut balance, task, iterations)?;
                 None
             } else {
@@ -233,7 +235,7 @@ impl Newton<'_> {
                 self.matrix.held = false;
                 return Ok((step, motion.increment, balance));
             }
-            let idle = if self.creeps_singly {
+            let idle = if self.takes_single_corrections {
                 IDLE_SINGLY
             } else {
                 IDLE
@@ -263,7 +265,11 @@ impl Newton<'_> {
     ///
     /// # Errors
     /// A law has no elastic operator, or elasticity alone leaves the equations singular.
-    fn start_creep(&mut self, task: &Task, guess: Option<&[f64]>) -> Result<Motion, StepFailure> {
+    fn start_viscous_motion(
+        &mut self,
+        task: &Task,
+        guess: Option<&[f64]>,
+    ) -> Result<Motion, StepFailure> {
         let still = vec![0.0; task.external.len()];
         let before = self.evaluate(&still, task, Operator::Elastic)?;
         let elastic = self.stiffness().to_vec();

@@ -1,35 +1,35 @@
 //! What leads the steps of an increment under `control = "auto"`: the load; where ever shorter steps by the load fail,
-//! creep by short steps, to the end of the increment; by turns, where creep fails too. Where all of that, or `control = "creep"`,
-//! has led no further and interfaces may break, creep by single corrections.
+//! viscous control by short steps, to the end of the increment; by turns, where viscous control fails too. Where all of that, or `control = "viscous"`,
+//! has led no further and interfaces may break, viscous control by single corrections.
 
 use crate::equilibrium::{Reason, Singularity, StepFailure};
 use crate::settings::{Control, Settings};
 
-/// Steps by the load that may fail in a row before creep leads. Plastic flow during a motion over a
+/// Steps by the load that may fail in a row before viscous control leads. Plastic flow during a motion over a
 /// whole increment stays in the state: a pile in dilatant sand (φ = ψ = 36°), pushed by whole
 /// increments of viscous control, carried 58 % more than under load control. The excess fell with
 /// the length of the steps.
 const PATIENCE: usize = 5;
-/// Longest step by creep, as a fraction of an increment.
+/// Longest step under viscous control, as a fraction of an increment.
 pub(super) const LONGEST: f64 = 0.125;
 
 /// The shortest one if the load may not be cut any further: viscous control has its own cuts.
 const SHORTEST: f64 = LONGEST / 8.0;
 
-/// How often creep by single corrections is begun with in an increment: with the shortest step, then with the longest.
+/// How often viscous control by single corrections is begun with in an increment: with the shortest step, then with the longest.
 const BEGINNINGS: usize = 2;
 
 /// What leads the steps of an increment.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lead {
     pub(super) control: Control,
-    /// Creep may be tried.
-    may_creep: bool,
+    /// Viscous control may be tried.
+    may_be_viscous: bool,
     /// It failed in this increment.
     was_in_vain: bool,
     /// Steps that failed in a row.
     failures: usize,
-    /// Creep goes by single corrections.
+    /// Viscous control goes by single corrections.
     pub(super) singly: bool,
     /// How often that may be begun with.
     beginnings: usize,
@@ -40,19 +40,23 @@ impl Lead {
     pub(super) fn new(settings: &Settings) -> Self {
         let is_auto = settings.control == Control::Auto;
         let is_newton = settings.method.is_newton();
-        let may_creep = is_auto && settings.relaxation && is_newton;
-        let creeps = settings.control == Control::Creep && is_newton;
+        let may_be_viscous = is_auto && settings.relaxation && is_newton;
+        let is_viscous = settings.control == Control::Viscous && is_newton;
         Self {
             control: settings.control,
-            may_creep,
+            may_be_viscous,
             was_in_vain: false,
             failures: 0,
             singly: false,
-            beginnings: if may_creep || creeps { BEGINNINGS } else { 0 },
+            beginnings: if may_be_viscous || is_viscous {
+                BEGINNINGS
+            } else {
+                0
+            },
         }
     }
 
-    /// Turns to creep by single corrections after a step that failed, if it may be begun with: the length of the first step
+    /// Turns to viscous control by single corrections after a step that failed, if it may be begun with: the length of the first step
     /// as a load factor, between the `shortest` one and the longest of one of `n` increments.
     pub(super) fn begins_singly(
         &mut self,
@@ -71,7 +75,7 @@ impl Lead {
             shortest.min(longest)
         };
         self.singly = true;
-        self.control = Control::Creep;
+        self.control = Control::Viscous;
         Some(length)
     }
 
@@ -87,21 +91,21 @@ impl Lead {
 
     /// Whether steps are short.
     pub(super) fn is_short(&self) -> bool {
-        self.creeps() || self.singly
+        self.is_viscous() || self.singly
     }
 
-    /// Whether creep leads where the load would have to.
-    pub(super) fn creeps(&self) -> bool {
-        self.may_creep && self.control == Control::Creep && !self.singly
+    /// Whether viscous control leads where the load would have to.
+    pub(super) fn is_viscous(&self) -> bool {
+        self.may_be_viscous && self.control == Control::Viscous && !self.singly
     }
 
-    /// Whether creep goes on with a step of this fraction of an increment after one that failed: where the load may
+    /// Whether viscous control goes on with a step of this fraction of an increment after one that failed: where the load may
     /// not be cut so far (`is_out`), no other way is left.
     pub(super) fn stays(&self, is_out: bool, step: f64) -> bool {
-        self.creeps() && is_out && step >= SHORTEST
+        self.is_viscous() && is_out && step >= SHORTEST
     }
 
-    /// Whether creep failed in this increment.
+    /// Whether viscous control failed in this increment.
     pub(super) fn was_in_vain(&self) -> bool {
         self.was_in_vain
     }
@@ -114,26 +118,26 @@ impl Lead {
     /// Turns to what leads after a step that failed (the last one that may be tried, or not), and whether that is another one. Laws
     /// that fail want smaller steps by the load, and what moves freely is held by nothing.
     pub(super) fn turns(&mut self, failure: &StepFailure, was_last: bool) -> bool {
-        let creeps = self.creeps();
-        if is_free(failure) || failure.failed().is_some() && !creeps {
+        let is_viscous = self.is_viscous();
+        if is_free(failure) || failure.failed().is_some() && !is_viscous {
             return false;
         }
         self.failures += 1;
-        if !self.may_creep || self.singly {
+        if !self.may_be_viscous || self.singly {
             return false;
         }
-        let turns = if creeps || self.was_in_vain {
-            creeps || failure.is_singular() && !was_last
+        let turns = if is_viscous || self.was_in_vain {
+            is_viscous || failure.is_singular() && !was_last
         } else {
             was_last || self.failures >= PATIENCE
         };
         if turns {
-            self.was_in_vain |= creeps;
+            self.was_in_vain |= is_viscous;
             self.failures = 0;
-            self.control = if creeps {
+            self.control = if is_viscous {
                 Control::Auto
             } else {
-                Control::Creep
+                Control::Viscous
             };
         }
         turns
