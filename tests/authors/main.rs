@@ -14,6 +14,7 @@ mod names;
 mod on_request;
 mod pages;
 mod program;
+mod prose;
 mod rates;
 mod reference;
 mod rooms;

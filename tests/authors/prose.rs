@@ -45,32 +45,66 @@ const KINDS: [Kind; 9] = [
     Kind {
         name: "a clause as the subject (What is ... is ...)",
         is_found: |sentence| {
-            let verbs = ["is", "are", "has", "have", "stands", "stand", "does", "takes", "costs", "goes", "comes"];
+            let verbs = [
+                "is", "are", "has", "have", "stands", "stand", "does", "takes", "costs", "goes",
+                "comes",
+            ];
             let words = &sentence.words;
             ["what", "who", "whoever", "where", "which"].contains(&words[0].as_str())
                 && !sentence.text.contains('?')
-                && !(words.len() > 2 && ["is", "are"].contains(&words[1].as_str()) && words[2] == "the")
+                && !(words.len() > 2
+                    && ["is", "are"].contains(&words[1].as_str())
+                    && words[2] == "the")
                 && words[1..].iter().any(|word| verbs.contains(&word.as_str()))
         },
     },
-    Kind { name: "begins with Of", is_found: |sentence| sentence.words[0] == "of" && sentence.words[1] != "course" },
-    Kind { name: "beside (besides, next to, compared with)", is_found: |sentence| has(sentence, &["beside"]) },
+    Kind {
+        name: "begins with Of",
+        is_found: |sentence| sentence.words[0] == "of" && sentence.words[1] != "course",
+    },
+    Kind {
+        name: "beside (besides, next to, compared with)",
+        is_found: |sentence| has(sentence, &["beside"]),
+    },
     Kind {
         name: "is none, is not there",
         is_found: |sentence| {
-            has(sentence, &["is none", "are none", "was none", "has none", "have none", "is not there"])
+            has(
+                sentence,
+                &[
+                    "is none",
+                    "are none",
+                    "was none",
+                    "has none",
+                    "have none",
+                    "is not there",
+                ],
+            )
         },
     },
-    Kind { name: "so many", is_found: |sentence| has(sentence, &["so many", "as many as there are"]) },
+    Kind {
+        name: "so many",
+        is_found: |sentence| has(sentence, &["so many", "as many as there are"]),
+    },
     Kind {
         name: "is said, is told (is reported, prints)",
-        is_found: |sentence| has(sentence, &["is said", "are said", "be said", "says so", "is told", "are told"]),
+        is_found: |sentence| {
+            has(
+                sentence,
+                &[
+                    "is said", "are said", "be said", "says so", "is told", "are told",
+                ],
+            )
+        },
     },
     Kind {
         name: "stands in (is in, is documented in)",
         is_found: |sentence| {
             ["in", "at", "on", "there", "beside"].iter().any(|place| {
-                has(sentence, &[&format!("stand {place}"), &format!("stands {place}")])
+                has(
+                    sentence,
+                    &[&format!("stand {place}"), &format!("stands {place}")],
+                )
             })
         },
     },
@@ -80,7 +114,14 @@ const KINDS: [Kind; 9] = [
     },
     Kind {
         name: "anew, thereby, whereby, therein, hence",
-        is_found: |sentence| has(sentence, &["anew", "thereby", "whereby", "therein", "thereof", "whither", "hence"]),
+        is_found: |sentence| {
+            has(
+                sentence,
+                &[
+                    "anew", "thereby", "whereby", "therein", "thereof", "whither", "hence",
+                ],
+            )
+        },
     },
 ];
 
@@ -93,7 +134,10 @@ fn files(folder: &Path, found: &mut Vec<PathBuf>) {
             if !is_left_out && !name.starts_with('.') {
                 files(&path, found);
             }
-        } else if matches!(path.extension().and_then(|end| end.to_str()), Some("md" | "rs")) {
+        } else if matches!(
+            path.extension().and_then(|end| end.to_str()),
+            Some("md" | "rs")
+        ) {
             found.push(path);
         }
     }
@@ -103,7 +147,10 @@ fn files(folder: &Path, found: &mut Vec<PathBuf>) {
 fn line_of_prose(line: &str, is_rust: bool, is_code: &mut bool) -> String {
     let trimmed = line.trim();
     let text = if is_rust {
-        match trimmed.strip_prefix("///").or_else(|| trimmed.strip_prefix("//!")) {
+        match trimmed
+            .strip_prefix("///")
+            .or_else(|| trimmed.strip_prefix("//!"))
+        {
             Some(text) => text.trim(),
             None => return String::new(),
         }
@@ -118,10 +165,16 @@ fn line_of_prose(line: &str, is_rust: bool, is_code: &mut bool) -> String {
         return String::new();
     }
     let number = text.trim_start_matches(|c: char| c.is_ascii_digit());
-    let item = ["- ", "* ", "+ "].iter().find_map(|mark| text.strip_prefix(mark));
-    item.or_else(|| number.strip_prefix(". ").filter(|_| number.len() < text.len()))
-        .unwrap_or(text)
-        .to_owned()
+    let item = ["- ", "* ", "+ "]
+        .iter()
+        .find_map(|mark| text.strip_prefix(mark));
+    item.or_else(|| {
+        number
+            .strip_prefix(". ")
+            .filter(|_| number.len() < text.len())
+    })
+    .unwrap_or(text)
+    .to_owned()
 }
 
 /// Text without code and without the targets of links.
@@ -131,7 +184,9 @@ fn plain(paragraph: &str) -> String {
         text.push_str(if at % 2 == 0 { part } else { "CODE" });
     }
     while let Some(at) = text.find("](") {
-        let Some(end) = text[at..].find(')') else { break };
+        let Some(end) = text[at..].find(')') else {
+            break;
+        };
         text.replace_range(at..=at + end, "");
         if let Some(open) = text[..at].rfind('[') {
             text.remove(open);
@@ -145,8 +200,14 @@ fn split(paragraph: &str) -> Vec<String> {
     let mut words = paragraph.split_whitespace().peekable();
     while let Some(word) = words.next() {
         let sentence = sentences.last_mut().unwrap();
-        let _ = write!(sentence, "{}{word}", if sentence.is_empty() { "" } else { " " });
-        let begins = words.peek().is_some_and(|next| next.starts_with(|c: char| c.is_ascii_uppercase() || c == '*'));
+        let _ = write!(
+            sentence,
+            "{}{word}",
+            if sentence.is_empty() { "" } else { " " }
+        );
+        let begins = words
+            .peek()
+            .is_some_and(|next| next.starts_with(|c: char| c.is_ascii_uppercase() || c == '*'));
         if word.ends_with(['.', '!', '?']) && begins {
             sentences.push(String::new());
         }
@@ -176,7 +237,11 @@ fn sentences(path: &Path, name: &str) -> Vec<Sentence> {
         for text in split(&plain(&paragraph)) {
             let words = words(&text);
             if words.len() >= 3 {
-                found.push(Sentence { place: format!("{name}:{start}"), text, words });
+                found.push(Sentence {
+                    place: format!("{name}:{start}"),
+                    text,
+                    words,
+                });
             }
         }
         paragraph.clear();
@@ -189,15 +254,29 @@ fn tree() -> Vec<Sentence> {
     let mut paths = Vec::new();
     files(root, &mut paths);
     paths.sort();
-    let name = |path: &Path| path.strip_prefix(root).unwrap().to_str().unwrap().replace('\\', "/");
-    paths.iter().flat_map(|path| sentences(path, &name(path))).collect()
+    let name = |path: &Path| {
+        path.strip_prefix(root)
+            .unwrap()
+            .to_str()
+            .unwrap()
+            .replace('\\', "/")
+    };
+    paths
+        .iter()
+        .flat_map(|path| sentences(path, &name(path)))
+        .collect()
 }
 
 /// The findings of a kind, with the first places where they are.
 fn report(kind: &str, found: &[&Sentence], of: usize) -> String {
     let mut text = format!("{} of {of} sentences: {kind}\n", found.len());
     for sentence in found.iter().take(40) {
-        let _ = writeln!(text, "  {}: {}", sentence.place, sentence.text.chars().take(140).collect::<String>());
+        let _ = writeln!(
+            text,
+            "  {}: {}",
+            sentence.place,
+            sentence.text.chars().take(140).collect::<String>()
+        );
     }
     text
 }
@@ -213,36 +292,58 @@ fn prose_is_plain() {
     assert!(of > 5000, "only {of} sentences were found");
     let (mut all, mut failures) = (0, String::new());
     for kind in &KINDS {
-        let found: Vec<&Sentence> = sentences.iter().filter(|sentence| (kind.is_found)(sentence)).collect();
+        let found: Vec<&Sentence> = sentences
+            .iter()
+            .filter(|sentence| (kind.is_found)(sentence))
+            .collect();
         all += found.len();
         if 1000.0 * share(found.len(), of) > ONE_KIND {
             failures += &report(kind.name, &found, of);
         }
     }
-    let long: Vec<&Sentence> = sentences.iter().filter(|sentence| sentence.words.len() > LONG).collect();
+    let long: Vec<&Sentence> = sentences
+        .iter()
+        .filter(|sentence| sentence.words.len() > LONG)
+        .collect();
     if share(long.len(), of) > LONG_SHARE {
         failures += &report("more than 35 words", &long, of);
     }
     assert!(failures.is_empty(), "{failures}");
-    assert!(1000.0 * share(all, of) <= ALL_KINDS, "{all} findings in {of} sentences");
+    assert!(
+        1000.0 * share(all, of) <= ALL_KINDS,
+        "{all} findings in {of} sentences"
+    );
 }
 
 #[test]
 fn the_theory_is_short_and_plain() {
     let page = repository().join("host/docs/THEORY.md");
-    assert!(fs::metadata(&page).unwrap().len() <= 30_000, "at most 30 KB");
+    assert!(
+        fs::metadata(&page).unwrap().len() <= 30_000,
+        "at most 30 KB"
+    );
     let sentences = sentences(&page, "host/docs/THEORY.md");
     let words: usize = sentences.iter().map(|sentence| sentence.words.len()).sum();
-    assert!(share(words, sentences.len()) <= 18.0, "at most 18 words a sentence");
+    assert!(
+        share(words, sentences.len()) <= 18.0,
+        "at most 18 words a sentence"
+    );
     let found = |sentence: &&Sentence| KINDS.iter().any(|kind| (kind.is_found)(sentence));
     let found: Vec<&Sentence> = sentences.iter().filter(found).collect();
     let text = report("all kinds", &found, sentences.len());
-    assert!(1000.0 * share(found.len(), sentences.len()) <= IN_THEORY, "{text}");
+    assert!(
+        1000.0 * share(found.len(), sentences.len()) <= IN_THEORY,
+        "{text}"
+    );
 }
 
 #[test]
 fn habits_are_found() {
-    let sentence = |text: &str| Sentence { place: String::new(), text: text.to_owned(), words: words(text) };
+    let sentence = |text: &str| Sentence {
+        place: String::new(),
+        text: text.to_owned(),
+        words: words(text),
+    };
     let found = |text: &str| KINDS.iter().any(|kind| (kind.is_found)(&sentence(text)));
     for text in [
         "What a front leaves to its parent is kept.",
@@ -252,7 +353,11 @@ fn habits_are_found() {
     ] {
         assert!(found(text), "{text}");
     }
-    for text in ["The parent keeps the Schur complement.", "Which is the default?", "Of course it does."] {
+    for text in [
+        "The parent keeps the Schur complement.",
+        "Which is the default?",
+        "Of course it does.",
+    ] {
         assert!(!found(text), "{text}");
     }
 }
