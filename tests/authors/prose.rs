@@ -250,7 +250,7 @@ fn sentences(path: &Path, name: &str) -> Vec<Sentence> {
 }
 
 fn tree() -> Vec<Sentence> {
-    let root = repository();
+    let root = &repository("");
     let mut paths = Vec::new();
     files(root, &mut paths);
     paths.sort();
@@ -317,7 +317,7 @@ fn prose_is_plain() {
 
 #[test]
 fn the_theory_is_short_and_plain() {
-    let page = repository().join("host/docs/THEORY.md");
+    let page = repository("host/docs/THEORY.md");
     assert!(
         fs::metadata(&page).unwrap().len() <= 30_000,
         "at most 30 KB"
