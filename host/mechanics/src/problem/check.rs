@@ -43,12 +43,12 @@ pub(crate) fn problem(problem: &Problem) -> Result<(), Refusal> {
                 .any(|said| *said == (number, Drainage::Undrained));
         check_group(number, group, is_undrained)?;
     }
-    if let Some(water) = &problem.water {
-        if !(water.unit_weight.is_finite() && water.unit_weight > 0.0) {
-            let what = "the water's `unit_weight`";
-            let cause = Cause::OutOfBounds(what, water.unit_weight, "a positive number");
-            return Err(Refusal::new(Item::Water(None), cause));
-        }
+    if let Some(water) = &problem.water
+        && !(water.unit_weight.is_finite() && water.unit_weight > 0.0)
+    {
+        let what = "the water's `unit_weight`";
+        let cause = Cause::OutOfBounds(what, water.unit_weight, "a positive number");
+        return Err(Refusal::new(Item::Water(None), cause));
     }
     phases(problem, &faces)?;
     super::faces::check(problem)

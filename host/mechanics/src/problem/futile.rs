@@ -79,7 +79,7 @@ fn lost(
     let again = later.iter().position(|phase| load.size(phase).is_some());
     let end = again.map_or(held.len(), |later| number + 1 + later);
     let earlier = phases[..number].iter().rev();
-    let stood = earlier.filter_map(|phase| load.size(phase)).next();
+    let stood = earlier.find_map(|phase| load.size(phase));
     let own = line(mesh, load.line, &load.item)?;
     let is_held = |dof: usize| match size {
         // Nothing where there was nothing: where a displacement was prescribed before, that frees nothing.

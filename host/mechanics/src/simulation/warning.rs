@@ -140,6 +140,10 @@ impl Warning {
     }
 }
 
+/// Single corrections are tried.
+const SINGLY: &str = "nothing else found an equilibrium, as where bonds break; viscous control takes single corrections, so that \
+                      broken bonds stay broken. Which bonds break can depend on the steps: compare with a run with more increments";
+
 /// Advice after viscous control.
 const COMPARE: &str =
     "Plastic flow on its way stays in the state: compare with a run with more increments";
@@ -234,12 +238,7 @@ impl fmt::Display for Warning {
                 "{place}: shorter and shorter load steps found no equilibrium; viscous control takes short steps to the end \
                  of the increment. {COMPARE}"
             ),
-            Self::SingleCorrections(place) => write!(
-                f,
-                "{place}: nothing else found an equilibrium, as where bonds break; viscous control takes single corrections, so \
-                 that broken bonds stay broken. Which bonds break can depend on the steps: compare with a run with more \
-                 increments"
-            ),
+            Self::SingleCorrections(place) => write!(f, "{place}: {SINGLY}"),
             Self::FollowedPath {
                 place,
                 start,
