@@ -115,7 +115,7 @@ typedef struct pilum_parameter {
     const char *id;
     /* Symbol in the literature. */
     const char *symbol;
-    /* Unit; `-` where there is none, `deg` for angles. */
+    /* Unit; `-` where absent, `deg` for angles. */
     const char *unit;
     /* One sentence. */
     const char *doc;
@@ -185,7 +185,7 @@ typedef struct pilum_formulation {
     const struct pilum_variable *gradient;
     /* Fluxes. */
     const struct pilum_variable *flux;
-    /* Internal variables; may be null if there are none. */
+    /* Internal variables; may be null if absent. */
     const struct pilum_variable *state;
 } pilum_formulation;
 
@@ -198,8 +198,7 @@ typedef struct pilum_formulation {
 #define PILUM_T_LOCAL_AXES (1u << 2)
 /* Offers rates, `PILUM_REQ_RATES`. Since 1.1. */
 #define PILUM_T_RATES (1u << 3)
-/* What it gives as its consistent tangent is near the derivative of the update, but not equal to
- * it. Since 1.1. */
+/* Its consistent tangent is close to the derivative of the update, but not equal to it. Since 1.1. */
 #define PILUM_T_TANGENT_APPROXIMATE (1u << 4)
 /* Offers the elastic operator only; asked for the consistent tangent, it answers
  * `PILUM_E_UNSUPPORTED`. Since 1.1. */
@@ -344,7 +343,7 @@ typedef struct pilum_law {
     const char *doc;
     /* Sources. */
     const char *references;
-    /* Parameters; may be null if there are none. */
+    /* Parameters; may be null if absent. */
     const struct pilum_parameter *parameter;
     /* Formulations. */
     const struct pilum_formulation *formulation;
