@@ -9,15 +9,15 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Largest number of findings in 1000 sentences, of one kind.
-const ONE_KIND: f64 = 3.0;
+const ONE_KIND: f64 = 11.0;
 /// The same, of all kinds.
-const ALL_KINDS: f64 = 10.0;
+const ALL_KINDS: f64 = 20.0;
 /// The same, on the page of the theory.
 const IN_THEORY: f64 = 5.0;
 /// Words of a long sentence.
 const LONG: usize = 35;
 /// Largest share of long sentences.
-const LONG_SHARE: f64 = 0.015;
+const LONG_SHARE: f64 = 0.025;
 
 struct Sentence {
     place: String,

@@ -505,7 +505,7 @@ fn a_phase_without_a_time_is_told_of_where_a_parameter_is_one() {
         for (said, phase) in lines.iter().zip(["weight", "push"]) {
             let place = format!("case.toml:{}:", line(&text, phase));
             let words = format!(
-                "law `soil` (`relaxation_time` is 2 s) depends on the time, and phase `{phase}` says none: it takes 1"
+                "phase `{phase}` has no `time`, and law `soil` (`relaxation_time` is 2 s) depends on time: the phase takes 1"
             );
             assert!(said.contains(&place) && said.contains(&words), "{said}");
         }

@@ -367,8 +367,8 @@ fn an_approximate_tangent_is_replaced_by_differences() {
     };
     let outcome = flowing(&place, "");
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    let says = "the tangents of law `umat_elastic_tangent` are approximate: they are made by \
-                differences of its stresses instead";
+    let says = "law `umat_elastic_tangent` declares its tangents approximate: differences of its stresses \
+                replace them";
     let said = outcome.stderr.matches(says).count();
     assert_eq!(said, 1, "{}", outcome.stderr);
     let declared = total(&place);

@@ -78,7 +78,7 @@ fn lost(
     let later = &phases[number + 1..];
     let again = later.iter().position(|phase| load.size(phase).is_some());
     let end = again.map_or(held.len(), |later| number + 1 + later);
-    let earlier = phases[..number].iter().rev();
+    let mut earlier = phases[..number].iter().rev();
     let stood = earlier.find_map(|phase| load.size(phase));
     let own = line(mesh, load.line, &load.item)?;
     let is_held = |dof: usize| match size {
