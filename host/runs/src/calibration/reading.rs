@@ -201,7 +201,7 @@ impl Model {
                     format!(", curve {}", curve + 1)
                 };
                 for (place, (key, none, reading)) in written.readings().into_iter().enumerate() {
-                    let Some(reading) = reading.map(|reading| reading.get_ref()) else {
+                    let Some(reading) = reading.map(toml::Spanned::get_ref) else {
                         continue;
                     };
                     let bounds = [reading.min, reading.max];

@@ -28,8 +28,11 @@ fn without_middles(mut model: Model, is_first: impl Fn(usize) -> bool) -> Model 
     model
 }
 
+/// Coordinates of a node as bits.
+type Bits = [u64; 2];
+
 /// Coordinates of the nodes of elements and lines.
-fn places(mesh: &Mesh) -> (Vec<Vec<[u64; 2]>>, Vec<Vec<(usize, usize)>>) {
+fn places(mesh: &Mesh) -> (Vec<Vec<Bits>>, Vec<Vec<(usize, usize)>>) {
     let at = |&node: &usize| mesh.nodes[node].map(f64::to_bits);
     let of = |solid: &Solid| solid.nodes().iter().map(at).collect();
     (
