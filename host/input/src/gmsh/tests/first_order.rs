@@ -30,9 +30,11 @@ fn without_middles(mut model: Model, is_first: impl Fn(usize) -> bool) -> Model 
 
 /// Coordinates of a node as bits.
 type Bits = [u64; 2];
+/// Edges of a line, as numbers of solids and sides.
+type Edges = Vec<(usize, usize)>;
 
 /// Coordinates of the nodes of elements and lines.
-fn places(mesh: &Mesh) -> (Vec<Vec<Bits>>, Vec<Vec<(usize, usize)>>) {
+fn places(mesh: &Mesh) -> (Vec<Vec<Bits>>, Vec<Edges>) {
     let at = |&node: &usize| mesh.nodes[node].map(f64::to_bits);
     let of = |solid: &Solid| solid.nodes().iter().map(at).collect();
     (
