@@ -225,7 +225,7 @@ fn words(sentence: &str) -> Vec<String> {
 
 fn sentences(path: &Path, name: &str) -> Vec<Sentence> {
     let text = fs::read_to_string(path).unwrap();
-    let is_rust = name.ends_with(".rs");
+    let is_rust = path.extension().is_some_and(|end| end == "rs");
     let (mut found, mut paragraph, mut start, mut is_code) = (Vec::new(), String::new(), 0, false);
     for (at, line) in text.lines().chain([""]).enumerate() {
         let line = line_of_prose(line, is_rust, &mut is_code);

@@ -470,6 +470,11 @@ fn refuses_mesh_files_that_are_wrong() {
 }
 
 /// The mesh of the tutorial's pile, and the same one without the nodes in the middles of its sides.
+#[expect(
+    clippy::unwrap_used,
+    clippy::format_push_string,
+    reason = "part of the tests"
+)]
 fn pile_meshes() -> [String; 2] {
     const FILE: &str = concat!(
         env!("CARGO_MANIFEST_DIR"),

@@ -353,8 +353,8 @@ mod tests {
         let of = |runs: usize, seed: u64| {
             let mut text = format!("method = \"saltelli\"\nruns = {runs}\nseed = {seed}\n");
             for name in ["x", "y", "z"] {
-                text += &format!(
-                    "[[parameter]]\nkey = \"{name}\"\nuniform = [{:?}, {pi:?}]\n",
+                text = format!(
+                    "{text}[[parameter]]\nkey = \"{name}\"\nuniform = [{:?}, {pi:?}]\n",
                     -pi
                 );
             }
