@@ -3,6 +3,7 @@
 //! The host knows no law, and asks it: a traction that changes over a vanishing part of the way has lost what it carried.
 
 use super::Group;
+use super::torn::SLIP;
 use law::Operator;
 
 /// Equal parts of the way that are looked at first, and how often a part is halved.
@@ -17,9 +18,14 @@ const SHORT: f64 = 1e-9;
 type Reached = (f64, Vec<f64>);
 
 impl Group {
-    /// Whether it is an interface whose law may break.
+    /// Whether it is an interface with a bond that may break: its law carries shear without normal stress.
     pub fn may_break(&self) -> bool {
-        self.is_active && !self.is_linear() && self.law.built.law.n_components() == 2
+        self.is_active
+            && !self.is_linear()
+            && self.law.built.law.n_components() == 2
+            && self
+                .tried([0.0, SLIP])
+                .is_some_and(|traction| traction[1].abs() > 0.0)
     }
 
     /// Jumps of the trial state, of all points.

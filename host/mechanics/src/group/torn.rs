@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// Slip that a bond is tried with, and a trace of opening, m.
-const SLIP: f64 = 1e-9;
+pub(super) const SLIP: f64 = 1e-9;
 const TRACE: f64 = 1e-12;
 
 /// State of an interface's bond.
@@ -113,7 +113,7 @@ impl Group {
     }
 
     /// Traction of the first point's law without stress after this jump; `None` if it fails.
-    fn tried(&self, jump: [f64; 2]) -> Option<[f64; 2]> {
+    pub(super) fn tried(&self, jump: [f64; 2]) -> Option<[f64; 2]> {
         let (_, law) = self.pieces(usize::MAX).into_iter().next()?;
         let state = self.internal.committed.get(..law.n_states())?;
         let (mut flux, mut after) = ([0.0; 2], state.to_vec());
