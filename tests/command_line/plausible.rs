@@ -491,7 +491,7 @@ fn a_phase_without_a_time_is_told_of_where_a_parameter_is_one() {
         let lines = outcome
             .stderr
             .lines()
-            .filter(|line| line.contains("says none"));
+            .filter(|line| line.contains("has no `time`"));
         lines.map(str::to_owned).collect::<Vec<_>>()
     };
     let text = CASE.replacen(SOIL, &viscous("2.0"), 1);

@@ -303,7 +303,7 @@ fn a_phase_without_a_time_is_told_of() {
     let said = "phase `hold` has no `time`, and law `soil` depends on time: the phase takes 1";
     assert!(outcome.says(said), "{}", outcome.stderr);
     assert!(
-        !outcome.says("phase `push` says none"),
+        !outcome.says("phase `push` has no `time`"),
         "{}",
         outcome.stderr
     );
