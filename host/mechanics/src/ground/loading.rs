@@ -2,7 +2,7 @@
 
 use crate::element::{depth, gauss, line_shape};
 use crate::group::Group;
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, Solid};
 use crate::problem::{Analysis, Axis, Formulation, Phase, Problem, Profile, Water};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -144,8 +144,11 @@ impl Loading {
                 .zip(own)
                 .for_each(|(force, own)| *force += own);
         }
+        let solids = mesh.solids.iter();
+        let present = solids.filter(|solid| self.active[solid.group] && !self.force.is_empty());
+        let present: HashSet<usize> = present.flat_map(Solid::nodes).copied().collect();
         for (line, total) in &self.force {
-            add_spread(problem, line, *total, force);
+            add_spread(problem, line, *total, &present, force);
         }
     }
 
@@ -369,14 +372,21 @@ fn leave_out_touching(mesh: &Mesh, edges: &mut Vec<(usize, usize)>) {
     edges.retain(|&edge| !touch.contains(&mesh.edge(edge)[2]));
 }
 
-/// Adds a force that is spread evenly over a line; on a point, evenly over its nodes.
-fn add_spread(problem: &Problem, line: &str, total: [f64; 2], force: &mut [f64]) {
+/// Adds a force that is spread evenly over a line; on a point, evenly over its nodes. The share of nodes and edges
+/// whose ground is removed, which are not among the nodes `present`, goes with it.
+fn add_spread(
+    problem: &Problem,
+    line: &str,
+    total: [f64; 2],
+    present: &HashSet<usize>,
+    force: &mut [f64],
+) {
     let (mesh, analysis) = (&problem.mesh, problem.analysis);
     let Some(line) = mesh.lines.get(line) else {
         return;
     };
     if line.edges.is_empty() {
-        for &node in &line.nodes {
+        for &node in line.nodes.iter().filter(|node| present.contains(node)) {
             for c in 0..2 {
                 force[2 * node + c] += total[c] / line.nodes.len() as f64;
             }
@@ -384,16 +394,19 @@ fn add_spread(problem: &Problem, line: &str, total: [f64; 2], force: &mut [f64])
         return;
     }
     let none = || std::iter::empty::<fn([f64; 2]) -> f64>();
-    let mut share = vec![0.0; force.len()];
+    // Of each node, the area of the line, and of its part where there is ground.
+    let mut areas = vec![0.0; force.len()];
     for &edge in &line.edges {
-        over_edge(mesh, analysis, edge, none(), &mut share, |_, inward| {
-            [inward[0].hypot(inward[1]), 0.0]
+        let is_present = present.contains(&mesh.edge(edge)[2]);
+        over_edge(mesh, analysis, edge, none(), &mut areas, |_, inward| {
+            let length = inward[0].hypot(inward[1]);
+            [length, if is_present { length } else { 0.0 }]
         });
     }
-    let area: f64 = share.iter().sum();
+    let whole: f64 = areas.iter().step_by(2).sum();
     for node in 0..mesh.nodes.len() {
         for c in 0..2 {
-            force[2 * node + c] += total[c] * share[2 * node] / area;
+            force[2 * node + c] += total[c] * areas[2 * node + 1] / whole;
         }
     }
 }
