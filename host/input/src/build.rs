@@ -1,16 +1,16 @@
 //! From a case file to a problem in memory and the results that are wanted of it; and back: which place
 //! of the file an error of the problem is about.
 
-mod spare;
+mod unused_laws;
 
-use self::spare::Look;
+use self::unused_laws::Look;
 use crate::case::{Case, CaseFile, GroupInput, LawInput, PhaseInput};
 use crate::ground::{LevelInput, ProfileInput, level};
 use crate::material::{
     LawTables, ParameterValue, ZONE, is_solid_at_interface, place_failure, try_law,
 };
 use crate::mesh::{self, Built, MeshFile};
-use crate::{Error, figures, idle, pile, probes};
+use crate::{Error, figures, ineffective_options, pile, probes};
 use abi::Hypothesis;
 use abi::status::Outcome;
 use indexmap::IndexMap;
@@ -271,7 +271,7 @@ impl Case {
         let mut warnings = probes::reactions(self, simulation.problem());
         warnings.extend(self.forgetful_swaps(simulation.problem()));
         warnings.extend(self.timeless_phases(simulation.problem()));
-        warnings.extend(idle::choices(self));
+        warnings.extend(ineffective_options::choices(self));
         warnings
     }
 

@@ -3,7 +3,7 @@
 use crate::case::MeasuredInput;
 use crate::material::ParameterValue;
 use crate::{Error, measured};
-use results::wanted::Measured;
+use results::output_request::Measured;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;

@@ -1,7 +1,7 @@
 //! The case file: what a user writes, key by key. Reading it gives these types; references
 //! between them (a group's law, a load's line) are resolved by the modules that use them.
 
-use crate::chosen::Chosen;
+use crate::accuracy_settings::Chosen;
 use crate::ground::{ProfileInput, StressInput, WaterChange, WaterInput};
 use crate::material::{ForeignKeys, ParameterTable, ParameterValue, Route, shear_zone};
 use crate::{Error, schema};
@@ -10,7 +10,7 @@ use law::ShearZone;
 use law::adapter::{Externals, Foreign, Order, Scratch};
 use mechanics::Settings;
 use mechanics::problem::{self, Analysis, Drainage, Formulation, InPlane, Integration};
-use results::wanted::{Output, Reduce};
+use results::output_request::{Output, Reduce};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, de};
 use std::borrow::Cow;

@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::case::MeasuredInput;
 use csv::{ByteRecord, Reader, ReaderBuilder};
-use results::wanted::Measured;
+use results::output_request::Measured;
 use std::path::Path;
 use text::file::read_text;
 use text::{Source, suggestion};

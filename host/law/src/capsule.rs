@@ -9,7 +9,7 @@ use crate::Error;
 use crate::FormulationDescription;
 use crate::adapter::{Adapter, Externals, Foreign, Order};
 use crate::description::words;
-use crate::library::probe::kept::Function;
+use crate::library::probe::call_log::Function;
 use crate::library::probe::{Form, PointStart};
 use crate::{BatchFailure, Law, LoadedLaw, Moment, Operator, PointCall, Request, ShearZone, Site};
 use abi::Hypothesis;

@@ -19,7 +19,7 @@ use super::library::{Call, SharedMemory, Strided, abaqus};
 use crate::Error;
 use crate::child::{self, Ending};
 use crate::law::LawInstance;
-use crate::opened::Origin;
+use crate::open_library::Origin;
 use crate::{Library, Moment, Opener, Site};
 use abi::Hypothesis;
 use abi::raw::{self, Status};

@@ -1,7 +1,7 @@
 //! A law with its parameters, as elements call it.
 
 use crate::adapter::ForeignInstance;
-use crate::calls::{self, Doing};
+use crate::current_call::{self, Doing};
 #[cfg(unix)]
 use crate::isolate;
 use crate::library::{Call, OwnedInstance, Strided};
@@ -258,7 +258,7 @@ impl Law {
             status: &mut status,
             step_factor: &mut factor,
         };
-        let result = calls::calling(self.name, Doing::Start, n_points, Moment::default(), || {
+        let result = current_call::calling(self.name, Doing::Start, n_points, Moment::default(), || {
             self.instance.init_state(call)
         });
         match result {
@@ -397,7 +397,7 @@ impl Law {
             step_factor: &mut *factor,
         };
         let update = || self.instance.integrate(call);
-        let (worst, message) = calls::calling(
+        let (worst, message) = current_call::calling(
             self.name,
             Doing::Update,
             start.n_points,

@@ -3,36 +3,36 @@
 //! or hang runs in a [`child`] process or in workers ([`isolate`]). The host's `unsafe` code is here.
 
 pub mod adapter;
-mod built;
+mod construct;
 mod call;
 #[cfg(unix)]
-pub mod calls;
+pub mod current_call;
 #[cfg(not(unix))]
 #[path = "calls/none.rs"]
-pub mod calls;
+pub mod current_call;
 pub mod capsule;
 pub mod child;
-pub mod custody;
+pub mod process_state;
 mod description;
 mod digest;
 mod error;
-mod image;
+mod library_bytes;
 pub mod inspect;
 #[cfg(unix)]
 pub mod isolate;
 mod law;
 mod library;
-mod opened;
+mod open_library;
 mod opener;
-mod pins;
+mod expected_hashes;
 mod search;
 mod shear_zone;
 mod stop;
 mod trust;
-pub mod vetting;
+pub mod trial;
 
 pub use abi::Hypothesis;
-pub use built::{BuildCause, BuildFailure, BuiltLaw, UsedParameter, Value};
+pub use construct::{BuildCause, BuildFailure, BuiltLaw, UsedParameter, Value};
 pub use call::{
     BatchFailure, BatchSuccess, End, Moment, Operator, PointCall, Request, Site, Start,
 };
@@ -48,9 +48,9 @@ pub use library::SharedMemory;
 #[doc(hidden)]
 pub use library::describe_memory;
 pub use library::{Strided, probe};
-pub use opened::{CreateFailure, Library, LoadedLaw};
+pub use open_library::{CreateFailure, Library, LoadedLaw};
 pub use opener::Opener;
-pub use pins::{Pins, lock_path};
+pub use expected_hashes::{Pins, lock_path};
 pub use search::{Libraries, Origin, Place, SearchPath};
 pub use shear_zone::ShearZone;
 pub use stop::{GRACE, Stop, Stopped};

@@ -27,15 +27,15 @@ pub use instance::Strided;
 #[cfg(unix)]
 pub use shared::SharedMemory;
 
-use super::custody;
+use super::process_state;
 use super::description::LawDescription;
-use super::image::Image;
+use super::library_bytes::Image;
 use abi::raw::{self, Host, Law, MagicBlock};
 use abi::version::{self, PLUGIN_SIZE_1_0};
 use describe::{describe, known};
 pub(crate) use instance::{Call, CallFailure, OwnedInstance};
 use instance::{NOTHING, NOWHERE};
-use probe::kept::{self, KeptPhase, Phase};
+use probe::call_log::{self, KeptPhase, Phase};
 use std::ffi::CStr;
 use std::hint::black_box;
 use std::mem::size_of;
@@ -106,7 +106,7 @@ pub(crate) fn open(path: &Path, image: Image) -> Result<OpenLibrary, String> {
 fn load_and_describe(path: &Path, image: Image) -> Result<OpenLibrary, String> {
     let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let begin =
-        |phase| kept::keep_phase(KeptPhase::new(phase, false)).map_err(|error| error.to_string());
+        |phase| call_log::keep_phase(KeptPhase::new(phase, false)).map_err(|error| error.to_string());
     begin(Phase::Load)?;
     // SAFETY: running the library's initialisers is what loading means; the user named it.
     let library: &'static libloading::Library =
@@ -188,7 +188,7 @@ fn apart<T: Send>(path: &Path, open: impl Fn() -> T + Sync) -> T {
         let did_flush = flushes();
         let opened = open();
         if flushes() && !did_flush {
-            custody::remark(format!(
+            process_state::remark(format!(
                 "library {} has the thread that opens it take numbers below 2.2e-308 for zero, as `-Ofast` and \
                  `-ffast-math` link it; it was opened in a thread of its own, so that the program still computes with \
                  them",

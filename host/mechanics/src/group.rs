@@ -3,46 +3,46 @@
 //! An increment starts from the committed state; every iteration computes the trial state from it,
 //! so a failed increment leaves nothing behind.
 
-mod aside;
 mod breaks;
-mod carry;
+mod broken_bonds;
 mod correction;
+mod depth_profile;
 mod differences;
-mod excerpt;
-mod gives;
-mod joined;
+mod failure_mode;
+mod integrate;
+mod law_start;
 mod layer;
-mod look;
 mod operator;
+mod point_tangent;
+mod probed_elements;
+mod saved_state;
 mod state;
-mod takeover;
-mod tangent;
-mod torn;
-mod varying;
+mod tangent_check;
+mod tied_faces;
 mod water;
 
 pub use differences::{Origin, Reason as MadeBy};
-pub use excerpt::Excerpted;
-pub use gives::Gives;
-pub use joined::joined;
-pub use look::{Deviation, Notice, Went};
+pub use failure_mode::Gives;
+pub use point_tangent::Fault;
+pub use probed_elements::Excerpted;
 pub use state::GroupState;
-pub use tangent::Fault;
+pub use tangent_check::{Deviation, Notice, Went};
+pub use tied_faces::tied_nodes;
 
 use crate::element::Kinematics;
 use crate::problem::{Formulation, InPlane, Material};
 use abi::status::Outcome;
 use algebra::threads;
-pub use aside::Aside;
+use broken_bonds::Bond;
+pub use broken_bonds::Torn;
+use depth_profile::Varying;
 use law::Law;
-use law::{BatchFailure, BatchSuccess, End, Moment, Operator, Site, Start, Strided, calls};
+use law::{BatchFailure, BatchSuccess, End, Moment, Operator, Site, Start, Strided, current_call};
+pub use law_start::TakeOver;
 use layer::Layer;
+pub use saved_state::Aside;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
-pub use takeover::TakeOver;
-use torn::Bond;
-pub use torn::Torn;
-use varying::Varying;
 use water::Pores;
 
 /// Components of the strain (jump) that a linear law is tried with, and what its stress may be off
@@ -378,7 +378,7 @@ impl Group {
         self.forget_trial();
         self.law = law;
         self.origin = Origin::default();
-        self.watched = calls::name(&format!("group `{}`", self.name));
+        self.watched = current_call::name(&format!("group `{}`", self.name));
         let law = &self.law.built.law;
         let name = &self.law.name;
         if self.law_calls.last().is_none_or(|calls| calls.law != *name) {
@@ -446,7 +446,7 @@ impl Group {
     /// Stresses that the law returns before any deformation.
     fn initial_state(&self) -> Result<Vec<f64>, PointFailure> {
         let place = self.flux_place();
-        calls::of_group(self.watched, 0, self.kinematics.points_of(0).len());
+        current_call::of_group(self.watched, 0, self.kinematics.points_of(0).len());
         let mut internal = Vec::new();
         for (points, law) in self.pieces(usize::MAX) {
             let flux = &self.stress.committed[points.start * place.point..points.end * place.point];

@@ -8,7 +8,7 @@ use crate::group::{Group, PointFailure};
 use crate::mesh::{Mesh, Shape, Solid};
 use crate::problem::{
     Analysis, Axis, Cause, ElementGroup, Formulation, InPlane, InitialStress, Integration, Item,
-    Key, Material, Problem, Refusal, check, constraints, plausible, tension,
+    Key, Material, Problem, Refusal, check, constraints, plausibility, sign_check,
 };
 use abi::Hypothesis;
 use law::Operator;
@@ -108,7 +108,7 @@ impl Model {
         }
         let ties = ties.ties;
         let mut warnings = constraints::check(problem, &ties)?;
-        warnings.extend(plausible::warnings(problem, &groups, &swaps));
+        warnings.extend(plausibility::warnings(problem, &groups, &swaps));
         Ok(Self {
             groups,
             ties,
@@ -485,7 +485,7 @@ impl GroupBuilder<'_> {
         let Some(InitialStress::Constant(stress)) = self.group.initial_stress else {
             return Ok(());
         };
-        match tension::turned(&material.built.law, self.group.formulation, stress) {
+        match sign_check::turned(&material.built.law, self.group.formulation, stress) {
             None => Ok(()),
             Some(refusal) => {
                 let cause = Cause::TurnedSigns {

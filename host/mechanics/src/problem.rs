@@ -1,21 +1,21 @@
 //! A problem as plain values: mesh, groups with their laws, supports, phases with their
 //! loads, settings. Units: kN, m, kPa; tension positive.
 
-pub(crate) mod alike;
-mod bared;
 pub(crate) mod check;
+mod compatibility;
 pub(crate) mod constraints;
-mod faces;
-mod futile;
 mod ground;
-mod held;
-mod likeness;
-pub(crate) mod plausible;
+mod ineffective_loads;
+mod loads_on_interfaces;
+pub(crate) mod plausibility;
 mod refusal;
-pub(crate) mod tension;
+mod restraint;
+pub(crate) mod sign_check;
+pub(crate) mod tied_dofs;
+mod uncovered_loads;
 
+pub use compatibility::{Likeness, Unlike};
 pub use ground::{AtRest, Drainage, InitialStress, Profile, Ratio, Water};
-pub use likeness::{Likeness, Unlike};
 pub use refusal::{Cause, Item, JointFault, Key, Refusal};
 
 use crate::mesh::Mesh;

@@ -38,24 +38,24 @@
 //! out rows, `walk` carries the point over an increment in steps, `search` finds the equilibrium of a
 //! step.
 
-mod anchor;
-mod course;
 mod driver;
 mod error;
+mod follow;
 mod frame;
+mod ignored_input;
+mod increments;
+mod messages;
 mod path;
 mod restrictions;
 mod search;
-mod silence;
 mod state;
-mod walk;
-mod words;
+mod tolerance_scale;
 
-pub use course::{Course, Row};
 pub use driver::{Driver, TIME};
 pub use error::{
     Cause, Criterion, Error, Failure, Misuse, Moved, NoEquilibrium, Place, Unmet, Warning,
 };
+pub use follow::{Course, Row};
 pub use frame::Frame;
 pub use path::{Control, MAX_INCREMENTS, Segment};
 pub use restrictions::{Restrictions, Rows};

@@ -21,20 +21,20 @@
 mod acceptance;
 mod direction;
 mod newton;
+mod norm;
 mod obstacle;
 mod relaxation;
-mod size;
 
 pub(crate) use obstacle::{Miss, Obstacle};
 
-use crate::anchor::Anchor;
 use crate::frame::Frame;
 use crate::restrictions::Restrictions;
 use crate::state::{Goal, N_MAX, Point, Step, Vector};
+use crate::tolerance_scale::Anchor;
 use abi::status::Outcome;
 use acceptance::Verdict;
 use law::{BatchFailure, End, Law, Moment, Operator, Start, Stop, Strided};
-use size::{largest, same};
+use norm::{largest, same};
 use std::mem::swap;
 
 /// The law's answer to one gradient.

@@ -14,7 +14,7 @@
 
 mod criteria;
 mod geometry;
-mod oddities;
+mod plausibility;
 mod table;
 
 pub use criteria::{Curve, Resistances};

@@ -12,11 +12,11 @@ mod comparison;
 mod fields;
 mod log;
 mod model;
+mod number_format;
 mod page;
 mod pile;
 mod profile;
 mod results;
-mod short;
 mod study;
 mod table;
 
@@ -25,9 +25,9 @@ pub(crate) use profile::{Point, Profiles};
 use text::Error;
 use text::write::replace_whole;
 
-use crate::record;
+use crate::output_request::Wanted;
 use crate::summary::About;
-use crate::wanted::Wanted;
+use crate::summary_reader;
 use budget::Budget;
 use mechanics::Simulation;
 use results::Run;
@@ -156,7 +156,7 @@ fn study_among(folders: &[PathBuf]) -> Result<Option<&Path>, Error> {
 fn read(folders: &[PathBuf], known: Option<Known>) -> Result<Vec<Run>, Error> {
     let budget = Budget::of(folders.len());
     let mut known = known.filter(|_| folders.len() == 1).unwrap_or_default();
-    let named = record::names(folders).into_iter().zip(folders);
+    let named = summary_reader::names(folders).into_iter().zip(folders);
     named
         .map(|(name, folder)| Run::read(&name, folder, std::mem::take(&mut known), &budget))
         .collect()

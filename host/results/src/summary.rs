@@ -1,7 +1,7 @@
 //! `summary.json`: what was run, with what, at what cost, and how it ended.
 
 use crate::mesh_error::OfPhase;
-use crate::wanted::{Figure, Measured, Wanted};
+use crate::output_request::{Figure, Measured, Wanted};
 use indexmap::IndexMap;
 use law::BuiltLaw;
 use mechanics::group::Group;

@@ -1,7 +1,7 @@
 //! One run: from a case to a folder with results.
 
 use crate::Error;
-use crate::ending::{ending, process};
+use crate::run_status::{ending, process};
 use input::build::{Laws, Posed};
 use input::mesh::MeshFile;
 use input::{Case, Kind, probes};
@@ -12,8 +12,8 @@ use mechanics::group::{Group, PointFailure};
 use mechanics::settings::Method;
 use mechanics::simulation::{Increment, Part, PhaseRecord, Snapshot, Warning, When};
 use mechanics::{Place, Problem, Simulation, State, Watch};
+use results::output_request::Wanted;
 use results::pile::Resistances;
-use results::wanted::Wanted;
 use results::{Checkpoint, Fault, Figures, Recorder, report};
 use std::fmt::Write as _;
 use std::ops::ControlFlow;

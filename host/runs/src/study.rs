@@ -5,13 +5,13 @@
 //! such a process does, or one that whatever else distributes work has started. The folders of the
 //! runs hold all results, so that any of these processes may be killed at any time.
 
-mod carry_out;
 mod design;
-mod one;
+mod execution;
+mod single_run;
 mod sobol;
 
-pub use carry_out::{Event, Jobs, carry_out};
-pub use one::{Once, follow, mend, run_one, stop_of_worker};
+pub use execution::{Event, Jobs, carry_out};
+pub use single_run::{Once, follow, mend, run_one, stop_of_worker};
 
 use crate::Error;
 use crate::run::{Ready, ready};

@@ -30,7 +30,7 @@ pub use child::{begin_run, case_begun, end, end_run, is_again, stdout, stop, was
 pub use parent::supervise;
 
 #[cfg(target_os = "linux")]
-use law::{SharedMemory, calls};
+use law::{SharedMemory, current_call};
 
 /// Set to anything, the program does all in one process, for debuggers and profilers.
 pub const ALONE: &str = "PILUM_UNSUPERVISED";
@@ -70,7 +70,7 @@ const FOLDER_WORDS: usize = 513;
 #[cfg(target_os = "linux")]
 const CALLS: usize = FOLDER + FOLDER_WORDS;
 #[cfg(target_os = "linux")]
-const SIZE: usize = CALLS + calls::SIZE;
+const SIZE: usize = CALLS + current_call::SIZE;
 
 #[cfg(target_os = "linux")]
 /// The memory that both share.
@@ -88,10 +88,10 @@ impl Page {
     }
 
     fn folder(&self) -> String {
-        calls::read_text(&self.0, FOLDER, FOLDER_WORDS)
+        current_call::read_text(&self.0, FOLDER, FOLDER_WORDS)
     }
 
-    fn calls(&self) -> calls::Watched<'_> {
-        calls::Watched(&self.0, CALLS)
+    fn calls(&self) -> current_call::Watched<'_> {
+        current_call::Watched(&self.0, CALLS)
     }
 }

@@ -6,18 +6,18 @@
 
 pub mod base;
 mod error;
+mod error_display;
 pub mod file;
 mod read;
 mod setting;
-mod shown;
 mod source;
 mod suggest;
-mod wording;
+mod toml_errors;
 pub mod write;
 
 pub use error::{Error, add_hint};
+pub use error_display::shown;
 pub use read::{Named, deserialize, parse, toml_error};
 pub use setting::key;
-pub use shown::shown;
 pub use source::{InputError, Line, Source};
 pub use suggest::{nearest, suggestion};

@@ -16,7 +16,7 @@ use crate::Error;
 use crate::description::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription, Tangent,
 };
-use crate::image::Image;
+use crate::library_bytes::Image;
 use crate::library::mfront::{Behaviour, Point, Sizes};
 use crate::library::{Call, CallFailure};
 use abi::Hypothesis;

@@ -17,7 +17,7 @@ use crate::Error;
 use crate::description::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription, Tangent,
 };
-use crate::image::Image;
+use crate::library_bytes::Image;
 use crate::library::udsm::{N_ARGUMENTS, Routine};
 use crate::library::{Call, CallFailure};
 use abi::Hypothesis;

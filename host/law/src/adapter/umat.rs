@@ -10,7 +10,7 @@ use super::{
     Refusal, each_point, time_of_call,
 };
 use crate::Error;
-use crate::image::Image;
+use crate::library_bytes::Image;
 use crate::library::umat::{N_ARGUMENTS, Routine};
 use crate::library::{Call, CallFailure};
 use abi::Hypothesis;

@@ -1,6 +1,6 @@
 //! Opening a library with a user-defined soil model of PLAXIS, and calling it.
 
-use super::super::image::Image;
+use super::super::library_bytes::Image;
 use super::umat::open_private;
 use std::ffi::{c_char, c_int, c_void};
 use std::path::Path;

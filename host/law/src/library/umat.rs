@@ -1,6 +1,6 @@
 //! Opening a library with an Abaqus user subroutine, and calling it.
 
-use super::super::image::Image;
+use super::super::library_bytes::Image;
 use std::ffi::c_void;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};

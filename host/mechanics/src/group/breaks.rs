@@ -3,7 +3,7 @@
 //! The host knows no law, and asks it: a traction that changes over a vanishing part of the way has lost what it carried.
 
 use super::Group;
-use super::torn::SLIP;
+use super::broken_bonds::SLIP;
 use law::Operator;
 
 /// Equal parts of the way that are looked at first, and how often a part is halved.

@@ -1,8 +1,8 @@
 //! Whether supports and prescribed displacements fit together, phase by phase.
 
-use super::alike::Alike;
-use super::futile::{self, Holder};
-use super::held::{Motion, Part, loose, parts};
+use super::ineffective_loads::{self, Holder};
+use super::restraint::{Motion, Part, loose, parts};
+use super::tied_dofs::Alike;
 use super::{Analysis, Axis, Cause, Displacement, Free, Item, Phase, Problem, Refusal};
 use crate::assembly::Tie;
 use crate::mesh::{Line, Mesh};
@@ -75,7 +75,7 @@ pub(crate) fn check(problem: &Problem, ties: &[Tie]) -> Result<Vec<String>, Refu
         }
         held.push(constraints.held_in(number, &active));
     }
-    warnings.extend(futile::check(problem, &held)?);
+    warnings.extend(ineffective_loads::check(problem, &held)?);
     Ok(warnings)
 }
 

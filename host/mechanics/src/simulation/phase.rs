@@ -1,6 +1,6 @@
 //! A phase: its equations, its loads, and what is out of balance as it begins.
 
-use super::complete::among_both;
+use super::commit::among_both;
 use super::history::History;
 use super::state::PhaseCourse;
 use super::{PhaseRecord, Simulation, UnderWay, Warning, Watch};

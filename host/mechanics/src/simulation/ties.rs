@@ -4,7 +4,7 @@ use super::Simulation;
 use super::loads::{Prescribed, part};
 use crate::assembly::Tie;
 use crate::error::Error;
-use crate::problem::alike::Alike;
+use crate::problem::tied_dofs::Alike;
 use crate::problem::{Cause, Item, Refusal};
 use std::collections::{HashMap, HashSet};
 

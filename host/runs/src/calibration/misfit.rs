@@ -1,7 +1,7 @@
 //! Bad fits: residuals as large as the measured values, and possible reasons.
 
 use super::curve::Curve;
-use super::words::digits;
+use super::messages::digits;
 
 /// Root of the mean square of residuals over the largest measured value from which on a fit is bad; and from
 /// which on it is where the computed curve explains less than half of what the measured one varies by.

@@ -1,8 +1,8 @@
 //! The tests of a calibration, computed for values of its parameters.
 
+use super::cache::{Kept, Key};
 use super::coordinates::Parameter;
 use super::curve::{Curve, Gap, Rows};
-use super::kept::{Kept, Key};
 use crate::Error;
 use crate::run::identity_of;
 use crate::trade_off::trial::{Scratch, Timing, measure};

@@ -9,17 +9,17 @@
 
 mod levels;
 mod mesh;
+pub(super) mod messages;
 mod search;
 mod table;
-pub(super) mod words;
 
-use super::kept::Kept;
 use super::scheme::Values;
 use super::trial::Scratch;
+use super::trial_cache::Kept;
 use crate::Error;
 use crate::run::{Observer, Options, identity_of, run_reusing};
 use input::Case;
-use input::chosen::{Chosen, Verdict};
+use input::accuracy_settings::{Chosen, Verdict};
 use input::material::ParameterValue;
 use law::Stop;
 use mechanics::equilibrium::Reuse;
@@ -59,7 +59,7 @@ pub fn run_accurately(
     })
     .map_err(of_trials)?;
     let case = studied.as_ref().unwrap_or(case);
-    match case.file.chosen.as_ref().map(words::outcome) {
+    match case.file.chosen.as_ref().map(messages::outcome) {
         Some(Ok(reached)) => observer.note(&reached),
         Some(Err(short)) => observer.warning(&short),
         None => (),

@@ -7,7 +7,7 @@
 //! stiffness that scale the elastic operator.
 
 use super::case_study::refuse_without_probes;
-use super::pace::Pace;
+use super::progress::Pace;
 use super::sampled::Sampled;
 use super::scheme::{Values, short};
 use super::trial::{Scratch, Settings, Timing, measure};
@@ -22,7 +22,7 @@ use mechanics::equilibrium::Reuse;
 use mechanics::group::Group;
 use mechanics::mesh::Joint;
 use mechanics::problem::Formulation;
-use results::wanted::{Output, When};
+use results::output_request::{Output, When};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;

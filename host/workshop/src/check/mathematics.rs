@@ -10,8 +10,8 @@ pub(super) use axes::own_random;
 pub(super) use rest::counts;
 pub(super) use tangent::{Slope, slope};
 
+use super::loading_path::Step;
 use super::specimen::Specimen;
-use super::walk::Step;
 use super::{Check, Family, Verdict};
 use abi::raw;
 use law::probe::PointStart;

@@ -5,7 +5,7 @@ use crate::Error;
 use crate::check::specimen::{create_form, first_difference, is_success};
 use law::capsule::Capsule;
 use law::child::{self, Ending, Work};
-use law::probe::kept::Function;
+use law::probe::call_log::Function;
 use law::probe::{Answer, Created, Form, PointEnd, PointStart, Probe};
 use law::{LoadedLaw, Opener, Trust};
 use std::path::{Path, PathBuf};

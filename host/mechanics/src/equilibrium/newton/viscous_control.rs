@@ -1,6 +1,6 @@
 //! Viscous control: from a step that Newton iterations cannot finish to an equilibrium, on the path of a body that comes to rest.
 //!
-//! As in [viscous relaxation](super::relaxation) a real body's motion to the next stable equilibrium is
+//! As in [viscous relaxation](super::viscous_relaxation) a real body's motion to the next stable equilibrium is
 //! followed where no branch of equilibria goes on. There one increment is tried again and again
 //! from the last equilibrium; here the motion is a path. Beside the stress of the law stands an overstress of Duvaut–Lions' kind (G. Duvaut, J. L. Lions 1972; J. C.
 //! Simo, J. G. Kennedy, S. Govindjee, Int. J. Numer. Meth. Engng 26, 1988),
@@ -28,8 +28,8 @@
 
 use super::failure::{Iterations, Reason, StepFailure};
 use super::outcome::Iteration;
-use super::relaxation::{follows, stands_still};
 use super::residual::{Balance, Task};
+use super::viscous_relaxation::{follows, stands_still};
 use super::{Newton, norm};
 use crate::assembly::norms;
 use crate::settings::{Control, Settings};

@@ -1,9 +1,9 @@
 //! Does a point that does not move stay where it is?
 
 use super::{ITERATED, UPDATE, flux_scale, increment, largest};
+use crate::check::loading_path::{Origin, Step};
 use crate::check::random::Random;
 use crate::check::specimen::{INSTANT, Specimen, first_difference, is_finite, is_success};
-use crate::check::walk::{Origin, Step};
 use crate::check::{Found, Subject, Verdict, skipped, status_name};
 use abi::raw;
 use law::probe::{Form, PointEnd, PointStart};

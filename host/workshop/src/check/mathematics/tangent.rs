@@ -1,10 +1,10 @@
 //! Is the consistent tangent the derivative of the update, symmetric and constant where that is declared?
 
 use super::{ELASTIC, LENGTHS, ROUND_OFF, flux_scale, increment, largest};
+use crate::check::loading_path::Step;
 use crate::check::margins;
 use crate::check::random::Random;
 use crate::check::specimen::{Specimen, is_success};
-use crate::check::walk::Step;
 use crate::check::{Found, Subject, Verdict, skipped};
 use abi::raw;
 use law::Tangent;

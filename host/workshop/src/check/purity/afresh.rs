@@ -5,7 +5,7 @@ use crate::check::specimen::{Function, Specimen, is_finite, is_success};
 use crate::check::{Found, Subject, Verdict, skipped};
 use crate::replay::probed::{self, shown};
 use law::capsule::Capsule;
-use law::probe::{PointEnd, PointStart, kept};
+use law::probe::{PointEnd, PointStart, call_log};
 
 use super::UPDATE;
 
@@ -58,8 +58,8 @@ impl<'a> Here<'a> {
     ) -> Result<Option<Difference>, Verdict> {
         let specimen = self.specimen;
         let (function, points) = match self.function {
-            Function::Integrate => (kept::Function::Integrate, self.starts.clone()),
-            Function::InitState => (kept::Function::InitState, fluxes(&self.starts)),
+            Function::Integrate => (call_log::Function::Integrate, self.starts.clone()),
+            Function::InitState => (call_log::Function::InitState, fluxes(&self.starts)),
         };
         let form = specimen.form(if self.function == Function::InitState {
             0

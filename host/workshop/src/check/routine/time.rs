@@ -1,10 +1,10 @@
 //! Does the time matter to a routine where that is reported, and nowhere else?
 
-use super::words::{Words, advice};
+use super::messages::{Words, advice};
 use super::{bits, differ, each, starts};
+use crate::check::loading_path::{Step, sum};
 use crate::check::mathematics::{ITERATED, flux_scale, increment};
 use crate::check::specimen::{Specimen, is_success};
-use crate::check::walk::{Step, sum};
 use crate::check::{Found, Subject, Verdict, skipped};
 use abi::raw;
 use law::adapter::Adapter;

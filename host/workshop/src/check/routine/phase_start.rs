@@ -1,11 +1,11 @@
 //! Does a routine go on where a phase begins? There KINC and the time of the step start again, and internal
 //! variables do not.
 
-use super::words::{Words, advice, has_sidecar, is_mfront};
+use super::messages::{Words, advice, has_sidecar, is_mfront};
 use super::{bits, differ, each};
+use crate::check::loading_path::{Step, sum};
 use crate::check::mathematics::{ITERATED, flux_scale, increment};
 use crate::check::specimen::{Specimen, is_success};
-use crate::check::walk::{Step, sum};
 use crate::check::{Found, Subject, Verdict, skipped};
 use abi::raw;
 use law::Moment;

@@ -6,7 +6,7 @@ use std::collections::HashSet;
 
 /// Some nodes, and those on the other faces of interfaces that are not there: what acts on one of them acts on all, and
 /// their forces are one. Each node once, in ascending order behind the given ones.
-pub fn joined(groups: &[Group], nodes: &[usize]) -> Vec<usize> {
+pub fn tied_nodes(groups: &[Group], nodes: &[usize]) -> Vec<usize> {
     let gone = groups
         .iter()
         .filter(|group| group.formulation == Formulation::ZeroThickness && !group.is_active);

@@ -1,8 +1,8 @@
 //! A calibration read: its tests with their laws, what its parameters stand for, where the search starts.
 
+use super::cache::Kept;
 use super::coordinates::Parameter;
 use super::curve::{Curve, Gap, Rows, extent};
-use super::kept::Kept;
 use super::model::{Model, Subject, Test, words};
 use crate::trade_off::trial::Scratch;
 use crate::variants::keep;
@@ -12,7 +12,7 @@ use input::material::{ParameterValue, set_parameters};
 use input::{Case, Driver};
 use law::{Bounds, LawDescription, Opener, ParameterDescription, Stop};
 use mechanics::equilibrium::Reuse;
-use results::wanted::Output;
+use results::output_request::Output;
 use std::collections::VecDeque;
 use std::path::Path;
 use text::suggestion;

@@ -3,9 +3,9 @@
 use crate::driver::Driver;
 use crate::error::{Cause, Error, NoEquilibrium, Place, Warning};
 use crate::frame::Frame;
+use crate::increments::{Halt, Walk};
 use crate::path::{Control, Segment};
 use crate::state::{Goal, Point};
-use crate::walk::{Halt, Walk};
 use law::{Moment, words};
 
 /// The state at the end of an increment, in the components of the law's hypothesis.

@@ -1,11 +1,11 @@
 //! Does a routine stay where it is without strain? If not: what has the increment before that left unreturned?
 
-use super::words::{Words, has_sidecar, is_mfront};
+use super::messages::{Words, has_sidecar, is_mfront};
 use super::{differ, each};
-use crate::check::extent::beyond_elastic;
+use crate::check::coverage::beyond_elastic;
+use crate::check::loading_path::Step;
 use crate::check::mathematics::{ELASTIC, ITERATED, depends_on_time, flux_scale, largest};
 use crate::check::specimen::{Specimen, is_success};
-use crate::check::walk::Step;
 use crate::check::{Found, Subject, Verdict, refusal, skipped};
 use abi::raw;
 use law::probe::PointStart;

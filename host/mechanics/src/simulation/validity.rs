@@ -4,7 +4,7 @@
 use crate::element::depth;
 use crate::group::Group;
 use crate::mesh::Mesh;
-use crate::problem::plausible::{LARGE, implausible_stiffness};
+use crate::problem::plausibility::{LARGE, implausible_stiffness};
 use crate::problem::{Analysis, Formulation};
 use std::collections::HashSet;
 

@@ -1,7 +1,7 @@
 //! The set of parameters to paste.
 
+use super::messages::digits;
 use super::model::{Model, Subject};
-use super::words::digits;
 use input::calibration::Calibration;
 use input::material::ParameterValue;
 use std::fmt::Write as _;

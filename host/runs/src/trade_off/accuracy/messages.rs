@@ -1,8 +1,8 @@
 //! What a study for an accuracy says.
 
-use super::super::pace::in_words;
+use super::super::progress::in_words;
 use super::STUDY;
-use input::chosen::{Chosen, FailedTrial, Verdict};
+use input::accuracy_settings::{Chosen, FailedTrial, Verdict};
 use std::fmt::Write;
 
 /// A trial came to no end.

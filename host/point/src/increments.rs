@@ -2,9 +2,9 @@
 
 use crate::error::{Criterion, NoEquilibrium, Unmet};
 use crate::frame::Frame;
+use crate::ignored_input::Silence;
 use crate::path::{Control, Segment};
 use crate::search::{Fatal, Miss, Obstacle, Search};
-use crate::silence::Silence;
 use crate::state::{Goal, N_MAX, Point, Step, Vector};
 use abi::Hypothesis;
 

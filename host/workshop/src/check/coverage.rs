@@ -1,9 +1,9 @@
 //! How far do the paths of the checks lead a law? One that is only ever asked what is elastic passes them all.
 
+use super::loading_path::Step;
 use super::mathematics::{ELASTIC, NEEDS, ROUND_OFF, flux_scale, increment, largest};
 use super::random::Random;
 use super::specimen::Specimen;
-use super::walk::Step;
 use super::{Check, Family, Found, Subject, Verdict, skipped};
 use law::probe::{PointEnd, PointStart};
 use std::fmt::Write as _;

@@ -30,7 +30,7 @@ pub(crate) fn warnings(
     let mut warnings = far(problem);
     warnings.extend(light(problem));
     warnings.extend(lost(problem));
-    warnings.extend(super::bared::warnings(problem));
+    warnings.extend(super::uncovered_loads::warnings(problem));
     warnings.extend(beside_undrained(problem));
     warnings.extend(water_inside(problem));
     for (number, group) in groups.iter().enumerate() {

@@ -1,7 +1,7 @@
 //! What a calibration leaves in its folder, and what it shows.
 
 use super::curve::Curve;
-use super::words::digits;
+use super::messages::digits;
 use super::{Interval, Open, Outcome, figures, page};
 use crate::Error;
 use input::calibration::{Calibration, Scale, Variance};

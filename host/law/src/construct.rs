@@ -1,6 +1,6 @@
 //! A law built from values by name: each held against what the law says of its parameters.
 
-use crate::{Law, LawDescription, LoadedLaw, ParameterDescription, custody};
+use crate::{Law, LawDescription, LoadedLaw, ParameterDescription, process_state};
 use abi::Hypothesis;
 use std::fmt;
 use text::suggestion;
@@ -201,7 +201,7 @@ impl LoadedLaw {
         let zone = self.shear_zone();
         warnings.extend(zone.and_then(|zone| zone.implausible(id)));
         warnings.extend(law.changes().iter().map(|it| format!("law `{id}`: {it}")));
-        warnings.extend(custody::remarks());
+        warnings.extend(process_state::remarks());
         Ok(BuiltLaw {
             law,
             parameters: used,

@@ -1,6 +1,6 @@
 //! Steps whose load factor is given: the strategies of Newton's method under load control.
 //!
-//! A standstill is [relaxed](super::relaxation) or [viscous](super::viscous_control) away; a [kept matrix](super::kept) is tried before that of
+//! A standstill is [relaxed](super::viscous_relaxation) or [viscous](super::viscous_control) away; a [kept matrix](super::matrix_reuse) is tried before that of
 //! the present state; slow corrections are [accelerated](super::acceleration).
 
 use super::acceleration::Acceleration;
@@ -8,9 +8,9 @@ use super::failure::{Motion, StepFailure};
 use super::iterate::{Control, Correction, State};
 use super::line_search::{LineSearch, Otherwise};
 use super::outcome::Iteration;
-use super::relaxation::{self, Relaxation};
 use super::residual::Task;
 use super::viscous_control::ViscousControl;
+use super::viscous_relaxation::{self, Relaxation};
 use super::{Newton, norm};
 use crate::settings::Method;
 use law::Operator;
@@ -137,7 +137,8 @@ impl Control for LoadControl {
         // What rounding leaves is looked for only where iterations lead no further: it costs two
         // evaluations.
         let series = self.series(iterations);
-        let stands_still = newton.settings.method.is_newton() && relaxation::stands_still(series);
+        let stands_still =
+            newton.settings.method.is_newton() && viscous_relaxation::stands_still(series);
         let ends = stands_still || newton.is_over(series);
         let last = iterations.last()?;
         let is_round_off =

@@ -94,6 +94,6 @@ impl Group {
 
     /// Whether its bond began without normal stress, and the first tension breaks it.
     pub fn is_bare(&self) -> bool {
-        self.bond == super::torn::Bond::Bare
+        self.bond == super::broken_bonds::Bond::Bare
     }
 }

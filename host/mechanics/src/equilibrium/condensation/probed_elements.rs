@@ -4,7 +4,7 @@
 //! A complete state holds residuals against the tolerance, and corrects its displacements; that of an excerpt
 //! follows from the boundary alone.
 
-use super::part::{Goal, Part};
+use super::probed_part::{Goal, Part};
 use super::{LinearDomain, LookedAt, Standing};
 use crate::element::Kinematics;
 use crate::equilibrium::newton::norm;

@@ -18,24 +18,24 @@
 //! If results need only some groups (the pile, not the sand), or some elements (those at its head),
 //! only these are updated, from the state before. The others wait for the next complete state.
 
-mod aside;
-mod excerpt;
-mod part;
-mod reuse;
+mod factor_reuse;
+mod probed_elements;
+mod probed_part;
+mod switched_unknowns;
 
-pub use reuse::Reuse;
+pub use factor_reuse::Reuse;
 
 use super::newton::{DomainFailure, Loads, noise, norm};
 use crate::assembly::{System, Tie, used};
 use crate::group::Group;
 use algebra::{Block, Dense, Kind, Multifrontal, Pattern, Singular};
-use aside::Aside;
-pub use aside::Held;
-use excerpt::Ahead;
-use part::{Goal, Part};
-use reuse::{Condensed, Numbered, Setup};
+use factor_reuse::{Condensed, Numbered, Setup};
+use probed_elements::Ahead;
+use probed_part::{Goal, Part};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+use switched_unknowns::Aside;
+pub use switched_unknowns::Held;
 
 /// What results look at.
 #[derive(Clone, Copy, Debug)]

@@ -1,6 +1,6 @@
 //! All runs of a study, this many at a time, each in a separate process.
 
-use super::one::{COORDINATOR, one_line};
+use super::single_run::{COORDINATOR, one_line};
 use super::{Plan, folder_of_run, is_wanted};
 use crate::{Error, supervision};
 use law::{Stop, Stopped};

@@ -1,6 +1,6 @@
 //! The part of a domain that results look at, and its state in equilibrium with the boundary.
 
-use super::excerpt::Excerpt;
+use super::probed_elements::Excerpt;
 use super::{LinearDomain, LookedAt, Origin, Standing};
 use crate::equilibrium::newton::{
     ACCEPTED_ROUND_OFF, DomainFailure, Loads, STILL_SMALL, last_bit_scattered, norm,

@@ -1,14 +1,14 @@
 //! Opened libraries and the laws in them.
 
 use crate::adapter::{Foreign, ForeignLaw};
-use crate::calls::{self, Doing};
+use crate::current_call::{self, Doing};
 #[cfg(unix)]
 use crate::isolate;
 use crate::law::LawInstance;
 use crate::library::{CallFailure, LawHandle, probe};
 use crate::opener::Stamp;
 use crate::shear_zone::{ShearZone, ZoneInstance};
-use crate::{Law, LawDescription, Moment, custody, search};
+use crate::{Law, LawDescription, Moment, process_state, search};
 use abi::Hypothesis;
 use abi::raw;
 use std::path::{Path, PathBuf};
@@ -172,15 +172,15 @@ impl LoadedLaw {
             .formulation(hypothesis)
             .ok_or_else(|| defect("the hypothesis is not offered"))?
             .clone();
-        let name = calls::name(&format!(
+        let name = current_call::name(&format!(
             "law `{}` of library {}",
             description.id,
             self.library.path.display()
         ));
-        calls::remember_process();
+        current_call::remember_process();
         let create = || self.instance(hypothesis, parameters);
-        let created = calls::calling(name, Doing::Create, 0, Moment::default(), create);
-        let changes = custody::restore().map_err(|why| defect(&why))?;
+        let created = current_call::calling(name, Doing::Create, 0, Moment::default(), create);
+        let changes = process_state::restore().map_err(|why| defect(&why))?;
         let instance = created.map_err(|(status, message)| {
             let parameter = message
                 .split_once(':')

@@ -9,7 +9,7 @@ use std::sync::{Mutex, PoisonError};
 /// end a run, but is reported of it in the end.
 macro_rules! say {
     ($($text:tt)*) => {
-        $crate::say::line(format!($($text)*))
+        $crate::output::line(format!($($text)*))
     };
 }
 

@@ -2,7 +2,7 @@
 
 use super::Group;
 use algebra::threads;
-use law::{BatchFailure, BatchSuccess, End, Law, Operator, Start, Strided, calls};
+use law::{BatchFailure, BatchSuccess, End, Law, Operator, Start, Strided, current_call};
 use std::ops::Range;
 
 /// Points that one thread takes at a time.
@@ -55,7 +55,7 @@ impl Group {
         let (watched, per_element) = (self.watched, self.kinematics.points_of(0).len());
         let (flux_end, end_place) = end.flux;
         let batch = |(points, law, [flux, state_end, operator_end]): Batch<'_>| {
-            calls::of_group(watched, points.start, per_element);
+            current_call::of_group(watched, points.start, per_element);
             let of = |stride: usize| points.start * stride..points.end * stride;
             law.integrate(
                 &Start {
@@ -133,7 +133,7 @@ impl Group {
         let rows = Strided::rows(n);
         let (mut flux_end, mut state_end) = (vec![0.0; n], vec![0.0; n_states]);
         let mut matrix = vec![0.0; n * n];
-        calls::of_group(self.watched, point, self.kinematics.points_of(0).len());
+        current_call::of_group(self.watched, point, self.kinematics.points_of(0).len());
         law.integrate(
             &Start {
                 n_points: 1,
