@@ -4,7 +4,7 @@ use serde::Serialize;
 
 /// Settings chosen for an `accuracy`.
 #[derive(Clone, Debug, Serialize)]
-pub struct Chosen {
+pub struct AccuracySettings {
     /// Relative error asked for.
     pub asked: f64,
     /// Relative error estimated; none where too few runs came to their end.

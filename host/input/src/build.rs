@@ -25,7 +25,7 @@ use mechanics::problem::{
 use mechanics::settings::Control;
 use mechanics::simulation::Warning;
 use mechanics::{Simulation, model};
-use results::{About, Wanted};
+use results::{About, OutputRequest};
 use std::ops::Range;
 use std::sync::Arc;
 use text::{Source, suggestion};
@@ -220,9 +220,9 @@ impl Case {
     ///
     /// # Errors
     /// [`text::Error::Input`] at the probe or figure that does not fit.
-    pub fn wanted(&self, simulation: &Simulation) -> Result<Wanted, Error> {
+    pub fn wanted(&self, simulation: &Simulation) -> Result<OutputRequest, Error> {
         let probes = probes::resolve(self, simulation)?;
-        let mut wanted = Wanted {
+        let mut wanted = OutputRequest {
             output: self.file.output,
             probes,
             pile: pile::resolve(self, simulation)?,

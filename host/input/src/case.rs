@@ -1,7 +1,7 @@
 //! The case file: what a user writes, key by key. Reading it gives these types; references
 //! between them (a group's law, a load's line) are resolved by the modules that use them.
 
-use crate::accuracy_settings::Chosen;
+use crate::accuracy_settings::AccuracySettings;
 use crate::ground::{ProfileInput, StressInput, WaterChange, WaterInput};
 use crate::material::{ForeignKeys, ParameterTable, ParameterValue, Route, shear_zone};
 use crate::{Error, schema};
@@ -201,7 +201,7 @@ pub struct CaseFile {
     pub accuracy_with_mesh: Option<Spanned<bool>>,
     /// The settings that such a study chose.
     #[serde(skip)]
-    pub chosen: Option<Chosen>,
+    pub chosen: Option<AccuracySettings>,
 }
 
 impl CaseFile {

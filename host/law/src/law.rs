@@ -258,9 +258,10 @@ impl Law {
             status: &mut status,
             step_factor: &mut factor,
         };
-        let result = current_call::calling(self.name, Doing::Start, n_points, Moment::default(), || {
-            self.instance.init_state(call)
-        });
+        let result =
+            current_call::calling(self.name, Doing::Start, n_points, Moment::default(), || {
+                self.instance.init_state(call)
+            });
         match result {
             None => Ok(state),
             Some((worst, message)) => {

@@ -3,45 +3,46 @@
 //! or hang runs in a [`child`] process or in workers ([`isolate`]). The host's `unsafe` code is here.
 
 pub mod adapter;
-mod construct;
 mod call;
+pub mod capsule;
+pub mod child;
+mod construct;
 #[cfg(unix)]
 pub mod current_call;
 #[cfg(not(unix))]
-#[path = "calls/none.rs"]
+#[path = "current_call/none.rs"]
 pub mod current_call;
-pub mod capsule;
-pub mod child;
-pub mod process_state;
 mod description;
 mod digest;
 mod error;
-mod library_bytes;
+mod expected_hashes;
 pub mod inspect;
 #[cfg(unix)]
 pub mod isolate;
 mod law;
 mod library;
+mod library_bytes;
 mod open_library;
 mod opener;
-mod expected_hashes;
+pub mod process_state;
 mod search;
 mod shear_zone;
 mod stop;
-mod trust;
 pub mod trial;
+mod trust;
 
 pub use abi::Hypothesis;
-pub use construct::{BuildCause, BuildFailure, BuiltLaw, UsedParameter, Value};
 pub use call::{
     BatchFailure, BatchSuccess, End, Moment, Operator, PointCall, Request, Site, Start,
 };
+pub use construct::{BuildCause, BuildFailure, BuiltLaw, UsedParameter, Value};
 pub use description::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription,
     Tangent, words,
 };
 pub use digest::{hexadecimal, hexadecimal_sha256};
 pub use error::Error;
+pub use expected_hashes::{Pins, lock_path};
 pub use law::{Law, TimeDependence};
 #[cfg(target_os = "linux")]
 pub use library::SharedMemory;
@@ -50,7 +51,6 @@ pub use library::describe_memory;
 pub use library::{Strided, probe};
 pub use open_library::{CreateFailure, Library, LoadedLaw};
 pub use opener::Opener;
-pub use expected_hashes::{Pins, lock_path};
 pub use search::{Libraries, Origin, Place, SearchPath};
 pub use shear_zone::ShearZone;
 pub use stop::{GRACE, Stop, Stopped};

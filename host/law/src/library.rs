@@ -27,9 +27,9 @@ pub use instance::Strided;
 #[cfg(unix)]
 pub use shared::SharedMemory;
 
-use super::process_state;
 use super::description::LawDescription;
 use super::library_bytes::Image;
+use super::process_state;
 use abi::raw::{self, Host, Law, MagicBlock};
 use abi::version::{self, PLUGIN_SIZE_1_0};
 use describe::{describe, known};
@@ -105,8 +105,9 @@ pub(crate) fn open(path: &Path, image: Image) -> Result<OpenLibrary, String> {
 
 fn load_and_describe(path: &Path, image: Image) -> Result<OpenLibrary, String> {
     let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
-    let begin =
-        |phase| call_log::keep_phase(KeptPhase::new(phase, false)).map_err(|error| error.to_string());
+    let begin = |phase| {
+        call_log::keep_phase(KeptPhase::new(phase, false)).map_err(|error| error.to_string())
+    };
     begin(Phase::Load)?;
     // SAFETY: running the library's initialisers is what loading means; the user named it.
     let library: &'static libloading::Library =

@@ -1,9 +1,9 @@
 //! Opening libraries: whom to trust, what to record, what is open already.
 
 use crate::adapter::{self, Adapter, Foreign, ForeignLaw};
-use crate::library_bytes::Image;
 #[cfg(unix)]
 use crate::isolate;
+use crate::library_bytes::Image;
 use crate::open_library::Origin;
 use crate::{Error, LawDescription, Library, Trust, child, library, trial};
 use std::path::{Path, PathBuf};

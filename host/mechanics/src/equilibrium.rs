@@ -6,7 +6,7 @@ mod diagnosis;
 mod mechanism;
 mod newton;
 
-pub use condensation::{Held, LinearDomain, LookedAt, Reuse, Standing};
+pub use condensation::{CheckedPoints, Held, LinearDomain, Reuse, Standing};
 pub use mechanism::Mechanism;
 pub use newton::{
     Clock, Costs, Criterion, Culprit, DomainFailure, Guess, Imbalance, Iteration, Iterations,

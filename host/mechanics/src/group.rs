@@ -22,7 +22,7 @@ mod tied_faces;
 mod water;
 
 pub use differences::{Origin, Reason as MadeBy};
-pub use failure_mode::Gives;
+pub use failure_mode::FailureMode;
 pub use point_tangent::Fault;
 pub use probed_elements::Excerpted;
 pub use state::GroupState;
@@ -34,11 +34,11 @@ use crate::problem::{Formulation, InPlane, Material};
 use abi::status::Outcome;
 use algebra::threads;
 use broken_bonds::Bond;
-pub use broken_bonds::Torn;
+pub use broken_bonds::BrokenBond;
 use depth_profile::Varying;
 use law::Law;
 use law::{BatchFailure, BatchSuccess, End, Moment, Operator, Site, Start, Strided, current_call};
-pub use law_start::TakeOver;
+pub use law_start::LawStart;
 use layer::Layer;
 pub use saved_state::Aside;
 use serde::{Deserialize, Serialize};
@@ -172,7 +172,7 @@ impl std::fmt::Display for PointFailure {
 /// Faces of an interface that stand apart, or touch without stress, as another law takes over, which
 /// is not told of gaps.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Parted {
+pub struct GroupSplit {
     /// Name of the group.
     pub group: String,
     /// Names of the two laws in the case file.
@@ -185,7 +185,7 @@ pub struct Parted {
     pub opening: f64,
 }
 
-impl std::fmt::Display for Parted {
+impl std::fmt::Display for GroupSplit {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self {
             group,
@@ -311,7 +311,7 @@ impl Group {
     ///
     /// # Errors
     /// The law cannot start from the stress.
-    pub fn set_law(&mut self, law: Material) -> Result<Option<Parted>, PointFailure> {
+    pub fn set_law(&mut self, law: Material) -> Result<Option<GroupSplit>, PointFailure> {
         let [old, new] = [&self.law, &law].map(|material| &material.built.law);
         let same = new.description().id == old.description().id;
         let kept = same && new.cannot_go_on_from(old).is_none();
@@ -322,7 +322,7 @@ impl Group {
     }
 
     /// Points of an interface that have moved and carry nothing.
-    fn parted(&self, law: &Material) -> Option<Parted> {
+    fn parted(&self, law: &Material) -> Option<GroupSplit> {
         let old = &self.law.built.law;
         if !self.is_active || old.n_components() != 2 {
             return None;
@@ -342,7 +342,7 @@ impl Group {
         let points: Vec<usize> = (0..all).filter(|&point| is_parted(point)).collect();
         let first = *points.first()?;
         let widest = points.iter().map(|&point| jumps[2 * point]);
-        Some(Parted {
+        Some(GroupSplit {
             group: self.name.clone(),
             laws: [self.law.name.clone(), law.name.clone()],
             points: [points.len(), all],

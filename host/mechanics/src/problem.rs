@@ -14,7 +14,7 @@ pub(crate) mod sign_check;
 pub(crate) mod tied_dofs;
 mod uncovered_loads;
 
-pub use compatibility::{Likeness, Unlike};
+pub use compatibility::{Compatibility, Incompatibility};
 pub use ground::{AtRest, Drainage, InitialStress, Profile, Ratio, Water};
 pub use refusal::{Cause, Item, JointFault, Key, Refusal};
 

@@ -43,7 +43,7 @@ use phase::PhaseEquations;
 use state::PhaseCourse;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
-use validity::Beyond;
+use validity::Validity;
 
 /// View of a state of equilibrium.
 #[derive(Clone, Copy, Debug)]
@@ -101,7 +101,7 @@ pub struct Simulation {
     /// The same at every degree of freedom.
     largest_forces: Vec<f64>,
     /// Results that the theory does not cover.
-    beyond: Beyond,
+    beyond: Validity,
     /// Rotations call forth no stresses in any group.
     turns_freely: bool,
     /// Mesh lines of the nodes.
@@ -173,7 +173,7 @@ impl Simulation {
             time: 0.0,
             largest_force: 0.0,
             largest_forces: vec![0.0; n_dofs],
-            beyond: Beyond::default(),
+            beyond: Validity::default(),
             turns_freely,
             lines: mesh_lines(nodes),
             reuse,
@@ -454,7 +454,7 @@ impl Simulation {
     fn tell_torn(&mut self, place: &Place, reached: bool, watch: &mut dyn Watch) {
         for group in self.groups.iter_mut().filter(|group| group.is_active) {
             if let Some(torn) = group.torn(reached) {
-                watch.warning(&Warning::Torn(place.clone(), torn));
+                watch.warning(&Warning::BrokenBond(place.clone(), torn));
             }
         }
     }

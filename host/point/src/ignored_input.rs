@@ -5,7 +5,7 @@ use law::Law;
 
 /// Steps whose gradient moved, and what the law made of them.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Silence {
+pub(crate) struct IgnoredInput {
     /// Increments with such a step.
     increments: usize,
     /// Place of the first.
@@ -16,7 +16,7 @@ pub(crate) struct Silence {
     has_answered: bool,
 }
 
-impl Silence {
+impl IgnoredInput {
     /// Takes in a step that the law answered.
     pub(crate) fn answered(&mut self) {
         self.has_answered = true;

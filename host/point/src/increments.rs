@@ -2,7 +2,7 @@
 
 use crate::error::{Criterion, NoEquilibrium, Unmet};
 use crate::frame::Frame;
-use crate::ignored_input::Silence;
+use crate::ignored_input::IgnoredInput;
 use crate::path::{Control, Segment};
 use crate::search::{Fatal, Miss, Obstacle, Search};
 use crate::state::{Goal, N_MAX, Point, Step, Vector};
@@ -112,7 +112,7 @@ pub(crate) struct Walk<'a> {
     pub(crate) cut_backs: usize,
     /// The law took no notice of a step of the last increment.
     pub(crate) is_ignored: bool,
-    pub(crate) silence: Silence,
+    pub(crate) silence: IgnoredInput,
 }
 
 impl<'a> Walk<'a> {
@@ -125,7 +125,7 @@ impl<'a> Walk<'a> {
             first_step: 1.0,
             cut_backs: 0,
             is_ignored: false,
-            silence: Silence::default(),
+            silence: IgnoredInput::default(),
         }
     }
 

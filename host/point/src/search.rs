@@ -30,7 +30,7 @@ pub(crate) use obstacle::{Miss, Obstacle};
 use crate::frame::Frame;
 use crate::restrictions::Restrictions;
 use crate::state::{Goal, N_MAX, Point, Step, Vector};
-use crate::tolerance_scale::Anchor;
+use crate::tolerance_scale::ToleranceScale;
 use abi::status::Outcome;
 use acceptance::Verdict;
 use law::{BatchFailure, End, Law, Moment, Operator, Start, Stop, Strided};
@@ -64,7 +64,7 @@ pub(crate) struct Search<'a> {
     /// The same in the components themselves.
     elastic_cartesian: Vec<f64>,
     elastic_norm: f64,
-    anchor: Anchor,
+    anchor: ToleranceScale,
     tangent: Operator,
     relaxation: Operator,
     base: Sample,
@@ -86,7 +86,7 @@ pub(crate) struct Search<'a> {
 impl<'a> Search<'a> {
     pub(crate) fn new(law: &'a Law, start: &Point) -> Self {
         let n = law.n_components();
-        let mut anchor = Anchor::default();
+        let mut anchor = ToleranceScale::default();
         start.flux.iter().for_each(|flux| anchor.flux(*flux));
         let sample = Sample {
             point: start.clone(),

@@ -14,7 +14,7 @@ const MET: f64 = 1e-9;
 
 /// Sizes given to a path up to the end of an increment.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Anchor {
+pub(crate) struct ToleranceScale {
     /// Largest flux that it started from or was asked for.
     flux: f64,
     /// Largest gradient prescribed.
@@ -23,7 +23,7 @@ pub(crate) struct Anchor {
     modulus: f64,
 }
 
-impl Anchor {
+impl ToleranceScale {
     /// Takes in a flux that the path starts from, or is asked for.
     pub(crate) fn flux(&mut self, flux: f64) {
         self.flux = self.flux.max(flux.abs());
@@ -80,8 +80,8 @@ mod tests {
     use approx::assert_relative_eq;
 
     /// 100 kPa on a law with 1e5 kPa, led by 0.01.
-    fn anchor() -> Anchor {
-        let mut anchor = Anchor::default();
+    fn anchor() -> ToleranceScale {
+        let mut anchor = ToleranceScale::default();
         anchor.flux(-100.0);
         anchor.flux(7.0);
         anchor.reach(-0.01);
@@ -102,7 +102,7 @@ mod tests {
 
     #[test]
     fn without_stiffness_or_anything_given_all_counts() {
-        let mut anchor = Anchor::default();
+        let mut anchor = ToleranceScale::default();
         assert_relative_eq!(anchor.flux_of(1e30), 1e30);
         assert_relative_eq!(anchor.reach_of(1e30), 1e30);
         anchor.flux(1.0);

@@ -26,7 +26,7 @@ mod table;
 
 pub use checkpoint::Checkpoint;
 pub use figure::Figures;
-pub use output_request::Wanted;
+pub use output_request::OutputRequest;
 pub use recorder::{Fault, Recorder, ResultsState, end_summary, make_way, remove_comparison};
 pub use summary::{About, Ending, LawsOfGroup};
 pub use table::number;

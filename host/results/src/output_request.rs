@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// The results that are wanted.
 #[derive(Debug)]
-pub struct Wanted {
+pub struct OutputRequest {
     /// When the larger tables and the fields are written.
     pub output: Output,
     /// Numbers for every increment.
@@ -22,7 +22,7 @@ pub struct Wanted {
     pub follows_path: bool,
 }
 
-impl Wanted {
+impl OutputRequest {
     /// Columns of numbers that `history.csv` has for every increment.
     pub fn columns(&self) -> impl Iterator<Item = &str> {
         let of_pile = self.pile.iter().flat_map(|_| pile::COLUMNS);

@@ -25,7 +25,7 @@ pub(crate) use profile::{Point, Profiles};
 use text::Error;
 use text::write::replace_whole;
 
-use crate::output_request::Wanted;
+use crate::output_request::OutputRequest;
 use crate::summary::About;
 use crate::summary_reader;
 use budget::Budget;
@@ -120,7 +120,7 @@ fn has_results(folder: &Path) -> bool {
 pub fn write_dry(
     folder: &Path,
     about: &About,
-    wanted: &Wanted,
+    wanted: &OutputRequest,
     simulation: &Simulation,
     warnings: &[String],
 ) -> Result<PathBuf, Error> {

@@ -12,7 +12,7 @@ use mechanics::group::{Group, PointFailure};
 use mechanics::settings::Method;
 use mechanics::simulation::{Increment, Part, PhaseRecord, Snapshot, Warning, When};
 use mechanics::{Place, Problem, Simulation, State, Watch};
-use results::output_request::Wanted;
+use results::output_request::OutputRequest;
 use results::pile::Resistances;
 use results::{Checkpoint, Fault, Figures, Recorder, report};
 use std::fmt::Write as _;
@@ -142,7 +142,7 @@ fn was_said(warning: &Warning) -> bool {
 fn all_warnings(
     case: &Case,
     laws: &Laws,
-    (simulation, wanted): (&Simulation, &Wanted),
+    (simulation, wanted): (&Simulation, &OutputRequest),
     notes: Vec<String>,
 ) -> Vec<String> {
     let of_laws = laws.values().flat_map(|law| law.warnings.iter().cloned());

@@ -16,9 +16,9 @@ use crate::Error;
 use crate::description::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription, Tangent,
 };
-use crate::library_bytes::Image;
 use crate::library::mfront::{Behaviour, Point, Sizes};
 use crate::library::{Call, CallFailure};
+use crate::library_bytes::Image;
 use abi::Hypothesis;
 use abi::raw::{self, Status};
 use std::f64::consts::SQRT_2;

@@ -17,9 +17,9 @@ use crate::Error;
 use crate::description::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription, Tangent,
 };
-use crate::library_bytes::Image;
 use crate::library::udsm::{N_ARGUMENTS, Routine};
 use crate::library::{Call, CallFailure};
+use crate::library_bytes::Image;
 use abi::Hypothesis;
 use abi::raw::{self, Status};
 use std::path::{Path, PathBuf};

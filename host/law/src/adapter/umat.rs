@@ -10,9 +10,9 @@ use super::{
     Refusal, each_point, time_of_call,
 };
 use crate::Error;
-use crate::library_bytes::Image;
 use crate::library::umat::{N_ARGUMENTS, Routine};
 use crate::library::{Call, CallFailure};
+use crate::library_bytes::Image;
 use abi::Hypothesis;
 use abi::raw::{self, Status};
 use std::fmt::Write as _;

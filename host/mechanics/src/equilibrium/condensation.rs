@@ -39,7 +39,7 @@ pub use switched_unknowns::Held;
 
 /// What results look at.
 #[derive(Clone, Copy, Debug)]
-pub struct LookedAt<'l> {
+pub struct CheckedPoints<'l> {
     /// For every group of the model, whether they do.
     pub groups: &'l [bool],
     /// Elements of every group that they look at where they do not at all of it, ascending.
@@ -522,7 +522,7 @@ impl LinearDomain {
     /// Why the groups are not in equilibrium.
     pub fn bring_up(
         &mut self,
-        looked_at: Option<LookedAt<'_>>,
+        looked_at: Option<CheckedPoints<'_>>,
         groups: &mut [Group],
         loads: &Loads,
         lambda: f64,

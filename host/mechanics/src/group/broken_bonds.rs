@@ -22,7 +22,7 @@ pub(super) enum Bond {
 
 /// A bond that began so, and what has become of it.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Torn {
+pub struct BrokenBond {
     /// The group.
     pub group: String,
     /// Name of its law in the problem.
@@ -33,7 +33,7 @@ pub struct Torn {
     pub of: usize,
 }
 
-impl fmt::Display for Torn {
+impl fmt::Display for BrokenBond {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             group,
@@ -66,7 +66,7 @@ impl Group {
     /// What has become of a bond that began so, once: where points have opened, and those that have not carry more shear
     /// than normal traction (where pressure holds them the others have been lifted off); where no equilibrium was
     /// `reached`, as long as nothing presses it together.
-    pub fn torn(&mut self, reached: bool) -> Option<Torn> {
+    pub fn torn(&mut self, reached: bool) -> Option<BrokenBond> {
         if self.bond != Bond::Bare {
             return None;
         }
@@ -82,7 +82,7 @@ impl Group {
         if open > 0 || pressed == of {
             self.bond = Bond::Other;
         }
-        (is_lost || is_in_the_way).then(|| Torn {
+        (is_lost || is_in_the_way).then(|| BrokenBond {
             group: self.name.clone(),
             law: self.law.name.clone(),
             open,

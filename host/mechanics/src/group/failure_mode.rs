@@ -15,7 +15,7 @@ const NOTABLE: f64 = 1e-9;
 /// How a point gives way, the most telling first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Gives {
+pub enum FailureMode {
     /// The traction of a bond breaks off.
     BondBreaks,
     /// The faces of an interface part, and carry nothing.
@@ -30,7 +30,7 @@ pub enum Gives {
     Yields,
 }
 
-impl fmt::Display for Gives {
+impl fmt::Display for FailureMode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::BondBreaks => "a bond breaks",
@@ -45,7 +45,7 @@ impl fmt::Display for Gives {
 
 impl Group {
     /// How a point gives way between the committed and the trial state. `None` where it follows elasticity.
-    pub fn gives(&self, point: usize, time: f64) -> Option<Gives> {
+    pub fn gives(&self, point: usize, time: f64) -> Option<FailureMode> {
         let n = self.law.built.law.n_components();
         let gradient = self.gradient();
         let own = n * point..n * (point + 1);
@@ -63,7 +63,7 @@ impl Group {
         let is_body = self.formulation == Formulation::Solid;
         let carries_nothing = !stress.iter().any(|s| s.abs() > 0.0);
         if carries_nothing && !is_body && n == 2 {
-            return (moved[0] > 0.0).then_some(Gives::Opens);
+            return (moved[0] > 0.0).then_some(FailureMode::Opens);
         }
         let (_, matrix) = self.answer(point, before, Operator::Elastic, (time, 0.0))?;
         let rows = matrix.chunks_exact(n);
@@ -78,17 +78,17 @@ impl Group {
         if n == 2 {
             let shear = elastic[1].abs() > NOTABLE * size(&stress_0) && lags(1);
             return match (shear, lags(0)) {
-                (true, _) => Some(Gives::Slides),
-                (false, true) => Some(Gives::Crushes),
+                (true, _) => Some(FailureMode::Slides),
+                (false, true) => Some(FailureMode::Crushes),
                 _ => None,
             };
         }
         let left: Vec<f64> = (0..n).map(left).collect();
         let gives = size(&left) > GIVES * size(&elastic);
         gives.then_some(if carries_nothing {
-            Gives::ComesApart
+            FailureMode::ComesApart
         } else {
-            Gives::Yields
+            FailureMode::Yields
         })
     }
 

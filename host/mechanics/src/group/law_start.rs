@@ -13,7 +13,7 @@ const ROUND_OFF: f64 = 1e-12;
 
 /// Stresses that a law returned at the strain at which it found others.
 #[derive(Clone, Debug, PartialEq)]
-pub struct TakeOver {
+pub struct LawStart {
     /// Name of the group.
     pub group: String,
     /// Name of the law in the case file.
@@ -35,7 +35,7 @@ pub struct TakeOver {
     pub stress: [[f64; 2]; 2],
 }
 
-impl std::fmt::Display for TakeOver {
+impl std::fmt::Display for LawStart {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self {
             group,
@@ -75,7 +75,7 @@ impl Group {
     ///
     /// # Errors
     /// The law fails over a nil increment. The committed state is untouched.
-    pub fn take_over(&mut self) -> Result<Option<TakeOver>, PointFailure> {
+    pub fn take_over(&mut self) -> Result<Option<LawStart>, PointFailure> {
         let answered = std::mem::take(&mut self.is_asked);
         let has_stress = self.stress.committed.iter().any(|&stress| stress != 0.0);
         let is_told = has_stress || !self.law.initial.is_empty();
@@ -103,7 +103,7 @@ impl Group {
 
     /// Makes stresses and internal variables of the trial state the committed ones if they differ
     /// by more than round-off.
-    fn taken_over(&mut self) -> Option<TakeOver> {
+    fn taken_over(&mut self) -> Option<LawStart> {
         if let Some(layer) = self.layer.as_ref().filter(|_| self.uses_layer()) {
             self.strain.trial.clone_from(&self.strain.committed);
             layer.stresses_along(&self.strain, &mut self.stress);
@@ -131,7 +131,7 @@ impl Group {
         let has_facet = n == 2 || self.layer.is_some();
         let traction = has_facet.then(|| [pair(committed), pair(trial)]);
         let (element, within) = self.kinematics.place_of(most);
-        let report = TakeOver {
+        let report = LawStart {
             group: self.name.clone(),
             law: self.law.name.clone(),
             change: changes[most],

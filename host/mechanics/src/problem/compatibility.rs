@@ -6,7 +6,7 @@ use std::hash::{DefaultHasher, Hasher as _};
 
 /// Checksums of everything that the states of a problem depend on, compared within one process.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Likeness {
+pub struct Compatibility {
     mesh: u64,
     /// Analysis, supports and ground water.
     whole: u64,
@@ -16,7 +16,7 @@ pub struct Likeness {
 
 /// What two problems differ in.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Unlike {
+pub enum Incompatibility {
     /// Nodes, elements or lines.
     Mesh,
     /// Analysis, supports or ground water.
@@ -31,11 +31,11 @@ pub enum Unlike {
 
 impl Problem {
     /// What its states depend on. How equilibrium is sought is no part of it.
-    pub fn likeness(&self) -> Likeness {
+    pub fn likeness(&self) -> Compatibility {
         let whole = format_args!("{:?} {:?} {:?}", self.analysis, self.supports, self.water).sum();
         let of_group = |group: &ElementGroup| (group.name.clone(), sum_of_group(group));
         let of_phase = |phase: &Phase| (phase.name.clone(), sum_of_phase(phase));
-        Likeness {
+        Compatibility {
             mesh: format_args!("{:?}", self.mesh).sum(),
             whole,
             groups: self.groups.iter().map(of_group).collect(),
@@ -44,32 +44,32 @@ impl Problem {
     }
 }
 
-impl Likeness {
+impl Compatibility {
     /// The first difference that keeps a state of one problem, in a phase, from being one of another; `None` if they are compatible.
-    pub fn unlike(&self, other: &Self, phase: usize) -> Option<Unlike> {
+    pub fn unlike(&self, other: &Self, phase: usize) -> Option<Incompatibility> {
         if self.mesh != other.mesh {
-            return Some(Unlike::Mesh);
+            return Some(Incompatibility::Mesh);
         }
         let names = |of: &Self| -> Vec<String> { of.groups.iter().map(|g| g.0.clone()).collect() };
         if names(self) != names(other) {
-            return Some(Unlike::Groups);
+            return Some(Incompatibility::Groups);
         }
         let mut groups = self.groups.iter().zip(&other.groups);
         if let Some((own, _)) = groups.find(|(own, other)| own != other) {
-            return Some(Unlike::Group(own.0.clone()));
+            return Some(Incompatibility::Group(own.0.clone()));
         }
         if self.whole != other.whole {
-            return Some(Unlike::Whole);
+            return Some(Incompatibility::Whole);
         }
         let up_to = |of: &Self, number: usize| of.phases.get(number).cloned();
         let is_other = |number: &usize| up_to(self, *number) != up_to(other, *number);
         let number = (0..=phase).find(is_other)?;
         let name = up_to(self, number).or_else(|| up_to(other, number));
-        Some(Unlike::Phase(name.unwrap_or_default().0))
+        Some(Incompatibility::Phase(name.unwrap_or_default().0))
     }
 }
 
-impl fmt::Display for Unlike {
+impl fmt::Display for Incompatibility {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Mesh => write!(f, "another mesh"),

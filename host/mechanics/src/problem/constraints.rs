@@ -2,7 +2,7 @@
 
 use super::ineffective_loads::{self, Holder};
 use super::restraint::{Motion, Part, loose, parts};
-use super::tied_dofs::Alike;
+use super::tied_dofs::TiedDofs;
 use super::{Analysis, Axis, Cause, Displacement, Free, Item, Phase, Problem, Refusal};
 use crate::assembly::Tie;
 use crate::mesh::{Line, Mesh};
@@ -187,7 +187,7 @@ impl<'a> Constraints<'a> {
     /// What is held in a phase: with one of some degrees of freedom that move alike all are.
     fn held_in(&self, number: usize, active: &[bool]) -> HashMap<usize, Holder> {
         let mut held = self.held.clone();
-        let alike = Alike::in_phase(self.problem, number, |group| active[group]);
+        let alike = TiedDofs::in_phase(self.problem, number, |group| active[group]);
         for dof in &alike.still {
             held.entry(*dof).or_insert(Holder::Support);
         }

@@ -8,13 +8,13 @@ const ON_AXIS: f64 = 1e-9;
 
 /// Degrees of freedom that move alike.
 #[derive(Default)]
-pub(crate) struct Alike {
+pub(crate) struct TiedDofs {
     root: BTreeMap<usize, usize>,
     /// Those of rigid lines that do not move, since their lines reach the axis of symmetry.
     pub(crate) still: Vec<usize>,
 }
 
-impl Alike {
+impl TiedDofs {
     /// In a phase, by number, in which these groups are there.
     pub(crate) fn in_phase(
         problem: &Problem,

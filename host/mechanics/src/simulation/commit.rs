@@ -4,7 +4,7 @@
 use super::phase::PhaseEquations;
 use super::{Part, Simulation, UnderWay, statics};
 use crate::assembly::fold;
-use crate::equilibrium::{Loads, LookedAt, Reason, StepSuccess, norm};
+use crate::equilibrium::{CheckedPoints, Loads, Reason, StepSuccess, norm};
 use std::time::Instant;
 
 impl Simulation {
@@ -67,7 +67,7 @@ impl Simulation {
         let mut beside = None;
         if let Some(domain) = &mut equations.domain {
             let tolerance = self.problem.settings.force_tolerance;
-            let looked_at = looked_at.map(|part| LookedAt {
+            let looked_at = looked_at.map(|part| CheckedPoints {
                 groups: &part.groups,
                 elements: &part.elements,
                 dofs: &part.dofs,

@@ -62,7 +62,7 @@ impl Simulation {
             self.groups[group].moment = moment;
             let parted = self.groups[group].set_law(law).map_err(cannot_start)?;
             if let Some(parted) = parted {
-                watch.warning(&Warning::Parted(phase.name.clone(), parted));
+                watch.warning(&Warning::GroupSplit(phase.name.clone(), parted));
             }
         }
         for (&group, [stress, lost]) in phase.activate.iter().zip(beside) {

@@ -4,7 +4,7 @@ use super::Simulation;
 use super::loads::{Prescribed, part};
 use crate::assembly::Tie;
 use crate::error::Error;
-use crate::problem::tied_dofs::Alike;
+use crate::problem::tied_dofs::TiedDofs;
 use crate::problem::{Cause, Item, Refusal};
 use std::collections::{HashMap, HashSet};
 
@@ -71,7 +71,7 @@ impl Simulation {
         number: usize,
         mut prescribed: Vec<Prescribed>,
     ) -> Result<Tied, Error> {
-        let alike = Alike::in_phase(&self.problem, number, |group| self.groups[group].is_active);
+        let alike = TiedDofs::in_phase(&self.problem, number, |group| self.groups[group].is_active);
         let held = alike.still.clone();
         let own: HashMap<usize, [f64; 2]> = prescribed
             .iter()

@@ -20,7 +20,7 @@ const WORTH: f64 = 0.1;
 
 /// The worst of a run so far.
 #[derive(Debug, Default)]
-pub(super) struct Beyond {
+pub(super) struct Validity {
     /// Share of the bodies' area with large strains, and the largest strain, with group and place.
     strained: Option<(f64, f64, String, [f64; 2])>,
     /// Largest displacement, and the longer side of the mesh.
@@ -36,7 +36,7 @@ pub(super) struct Beyond {
     stiffness: Vec<String>,
 }
 
-impl Beyond {
+impl Validity {
     /// Looks at a state of equilibrium.
     pub(super) fn look(
         &mut self,

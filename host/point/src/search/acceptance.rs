@@ -2,7 +2,7 @@
 //! whatever ended them.
 //!
 //! Tolerances are relative to fluxes and gradients, as far as what the path was given explains
-//! them ([`Anchor`](crate::tolerance_scale::Anchor)).
+//! them ([`ToleranceScale`](crate::tolerance_scale::Anchor)).
 
 use super::norm::{largest, norm};
 use super::{Miss, Search};

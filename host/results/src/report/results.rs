@@ -10,7 +10,7 @@ use super::pile::Pile;
 use super::profile::Profile;
 use super::table::Table;
 use crate::fields::unstructured_grid;
-use crate::output_request::Wanted;
+use crate::output_request::OutputRequest;
 use crate::pressures::Pressure;
 use crate::summary::{About, Summary};
 use crate::summary_reader::{entries, list, text};
@@ -269,7 +269,7 @@ impl Run {
     pub(super) fn before(
         folder: &Path,
         about: &About,
-        wanted: &Wanted,
+        wanted: &OutputRequest,
         simulation: &Simulation,
         warnings: &[String],
     ) -> Self {

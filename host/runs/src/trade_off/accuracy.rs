@@ -19,7 +19,7 @@ use super::trial_cache::Kept;
 use crate::Error;
 use crate::run::{Observer, Options, identity_of, run_reusing};
 use input::Case;
-use input::accuracy_settings::{Chosen, Verdict};
+use input::accuracy_settings::{AccuracySettings, Verdict};
 use input::material::ParameterValue;
 use law::Stop;
 use mechanics::equilibrium::Reuse;
@@ -143,7 +143,7 @@ pub fn reach_until(
         let name = phase.name.get_ref().clone();
         (name, *phase.increments.get_ref())
     });
-    chosen.file.chosen = Some(Chosen {
+    chosen.file.chosen = Some(AccuracySettings {
         asked,
         reached,
         without_mesh,

@@ -5,7 +5,7 @@
 //! follows from the boundary alone.
 
 use super::probed_part::{Goal, Part};
-use super::{LinearDomain, LookedAt, Standing};
+use super::{CheckedPoints, LinearDomain, Standing};
 use crate::element::Kinematics;
 use crate::equilibrium::newton::norm;
 use crate::group::{Excerpted, Group};
@@ -70,7 +70,7 @@ impl LinearDomain {
     /// Whether excerpts may go further ahead: as long as rounding of the motion since the complete state, in which the
     /// rest of their groups waits, stays below the tolerance. Otherwise the state has to be completed; and where that
     /// would be so again soon, their groups follow as a whole from then on.
-    pub(super) fn may_go_ahead(&mut self, looked_at: &LookedAt<'_>, goal: &Goal<'_>) -> bool {
+    pub(super) fn may_go_ahead(&mut self, looked_at: &CheckedPoints<'_>, goal: &Goal<'_>) -> bool {
         if self.standing.as_groups || looked_at.elements.iter().all(Vec::is_empty) {
             return true;
         }

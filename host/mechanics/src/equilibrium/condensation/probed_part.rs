@@ -1,7 +1,7 @@
 //! The part of a domain that results look at, and its state in equilibrium with the boundary.
 
 use super::probed_elements::Excerpt;
-use super::{LinearDomain, LookedAt, Origin, Standing};
+use super::{CheckedPoints, LinearDomain, Origin, Standing};
 use crate::equilibrium::newton::{
     ACCEPTED_ROUND_OFF, DomainFailure, Loads, STILL_SMALL, last_bit_scattered, norm,
 };
@@ -89,10 +89,10 @@ impl LinearDomain {
     /// one than that which the latest state is of.
     pub(super) fn choose_part(
         &mut self,
-        looked_at: Option<LookedAt<'_>>,
+        looked_at: Option<CheckedPoints<'_>>,
         of_model: &[Group],
     ) -> bool {
-        let Some(LookedAt {
+        let Some(CheckedPoints {
             groups: looked,
             elements,
             dofs,

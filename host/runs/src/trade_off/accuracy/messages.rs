@@ -2,7 +2,7 @@
 
 use super::super::progress::in_words;
 use super::STUDY;
-use input::accuracy_settings::{Chosen, FailedTrial, Verdict};
+use input::accuracy_settings::{AccuracySettings, FailedTrial, Verdict};
 use std::fmt::Write;
 
 /// A trial came to no end.
@@ -72,7 +72,7 @@ pub(super) fn mesh_diverges(n: usize, [coarse, fine]: [f64; 2], why: Option<Stri
 
 /// Whether what was asked for is reached, and with what settings: of a result that is short of it a
 /// warning.
-pub(super) fn outcome(chosen: &Chosen) -> Result<String, String> {
+pub(super) fn outcome(chosen: &AccuracySettings) -> Result<String, String> {
     let settings = settings(chosen);
     match chosen.verdict {
         Verdict::Reached if chosen.cut_back > 0 => Err(format!(
@@ -100,7 +100,7 @@ pub(in super::super) fn zero(names: &[String]) -> String {
 }
 
 /// The choice, its error, and the failed trials.
-fn settings(chosen: &Chosen) -> String {
+fn settings(chosen: &AccuracySettings) -> String {
     let asked = format!("{:.1e} asked for", chosen.asked);
     let error = match (chosen.reached, chosen.without_mesh, chosen.difference) {
         (Some(error), ..) => format!("error {error:.1e} estimated, {asked}"),
@@ -173,7 +173,7 @@ mod tests {
 
     #[test]
     fn what_is_reached_by_runs_that_cut_steps_back_is_a_warning() {
-        let mut chosen = Chosen {
+        let mut chosen = AccuracySettings {
             asked: 0.01,
             reached: Some(0.004),
             without_mesh: Some(0.004),
