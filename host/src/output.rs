@@ -22,7 +22,8 @@ pub(crate) fn line(mut text: String) {
 /// Why the error stream took no more.
 static UNSAID: Mutex<Option<std::io::Error>> = Mutex::new(None);
 
-/// Keeps why a line could not be written. Whoever reads a pipe may have read enough.
+/// Keeps why a line could not be written. A closed pipe does not count: its reader may have read
+/// enough.
 fn unsaid(written: std::io::Result<()>) {
     if let Err(why) = written
         && why.kind() != std::io::ErrorKind::BrokenPipe
@@ -64,8 +65,8 @@ impl Output {
         self.text(&format!("{text}\n"));
     }
 
-    /// How the command ends: what it came to matters more than what could not be reported of it.
-    /// Whoever reads a pipe may have read enough.
+    /// How the command ends: its outcome matters more than lines that could not be written. A
+    /// closed pipe does not count: its reader may have read enough.
     pub(crate) fn end(self, outcome: Result<(), Error>) -> Result<(), Error> {
         let is_read = |why: &std::io::Error| why.kind() == std::io::ErrorKind::BrokenPipe;
         outcome.and(match self.failure.filter(|why| !is_read(why)) {

@@ -1,9 +1,9 @@
 //! Laws of solids in a shear zone of an interface.
 //!
-//! Goal      any law of solids is a law of interfaces, with the answers that simple shear has
-//! Geometry, boundary, law: cases/shear_zone/README.md
+//! Goal      any law of solids is a law of interfaces, with the answers that simple shear has.
+//! Geometry, boundary, law: cases/shear_zone/README.md.
 //! Asserts   elastic stage τ = G u_t/d up to the yield that the lateral stress gives; limits of
-//!           Mohr–Coulomb in simple shear; the oriented criterion; critical state of hypoplasticity
+//!           Mohr–Coulomb in simple shear; the oriented criterion; critical state of hypoplasticity.
 
 use runs::point::run_file_variants;
 use std::path::{Path, PathBuf};

@@ -1,6 +1,6 @@
-//! The archive that is installed: which files of the repository and of what cargo has built go where.
-//! A folder is laid out as `/usr/local` is, so that it can be unpacked there, or anywhere: the program finds
-//! its laws by where it lies itself, pkg-config and CMake find the headers by where their files lie.
+//! The archive that is installed: which files of the repository and of cargo's output go where. Its layout
+//! is that of `/usr/local`; it can be unpacked there or anywhere else. The program finds its laws relative
+//! to itself; pkg-config and CMake find the headers relative to their files.
 //!
 //! ```text
 //! bin/pilum

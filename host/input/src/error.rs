@@ -181,7 +181,7 @@ fn may_have_another_way(reason: &Reason) -> bool {
     }
 }
 
-/// Who has to act.
+/// The one who has to act.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Whoever wrote the input; places that cannot be read or written included.
@@ -262,7 +262,7 @@ impl Error {
         }
     }
 
-    /// Who has to act.
+    /// The one who has to act.
     pub fn kind(&self) -> Kind {
         use abi::status::Outcome;
         match self {

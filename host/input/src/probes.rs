@@ -373,8 +373,8 @@ impl Resolver<'_> {
         })
     }
 
-    /// Whether a point lies strictly inside the extents. What is weighted counts, on their edge, if its
-    /// element lies inside: points of adjoining extents then count once.
+    /// Whether a point lies strictly inside the extents. Weighted points on their edge count if the
+    /// element lies inside: a point between adjoining extents then counts once.
     fn counts(&self, group: &Group, point: usize) -> bool {
         let position = group.kinematics.position(point);
         if self.inside(position) {

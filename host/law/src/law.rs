@@ -184,9 +184,9 @@ impl Law {
         })
     }
 
-    /// Whether a failure that no smaller step helps is trouble with the library, and not a limit of
-    /// what the law can follow: numbers that are not finite under a claim of success, which is all
-    /// that is numeric about routines made for other programs.
+    /// Whether a failure that no smaller step helps is a fault of the library, not a limit of what
+    /// the law can follow: values that are not finite although success is claimed. Every numeric
+    /// failure of a routine made for another program is of this kind.
     pub fn breaks_down(&self, failure: &BatchFailure) -> bool {
         let is_foreign = self.library().foreign().is_some();
         failure.outcome == Outcome::Numeric && (is_foreign || failure.claims_success)

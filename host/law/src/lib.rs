@@ -1,5 +1,5 @@
 //! A library file becomes a law that can be called: searching, checking, opening, describing,
-//! building and calling. What is made for other programs stands behind an [`adapter`]; what may crash
+//! building and calling. An [`adapter`] wraps libraries made for other programs. Code that may crash
 //! or hang runs in a [`child`] process or in workers ([`isolate`]). The host's `unsafe` code is here.
 
 pub mod adapter;

@@ -139,9 +139,9 @@ fn load_and_describe(path: &Path, image: Image) -> Result<OpenLibrary, String> {
     describe(&plugin)
 }
 
-/// Loads the hashed bytes. Where that fails (a library that looks for others next to itself, a
-/// system that executes nothing from memory), the file is loaded, if it is still the same: the
-/// loader runs nothing of a library it cannot load.
+/// Loads the hashed bytes. If that fails (a library that looks for others next to itself, a system
+/// that executes nothing from memory), the file is loaded, provided it is unchanged. The loader
+/// runs nothing of a library it cannot load.
 ///
 /// # Safety
 /// The library's initialisers may be run.
@@ -182,8 +182,8 @@ unsafe fn load(file: &Path, path: &Path) -> Result<libloading::Library, libloadi
 /// Stack of the thread in which initialisers run: as large as that of a main thread.
 const STACK: usize = 8 << 20;
 
-/// Opens the library at `path` in its own thread. What its initialisers do to the arithmetic of their thread, as
-/// those that `-Ofast` links do, ends with that thread. Where there can be none it is opened in this one.
+/// Opens the library at `path` in its own thread. Changes that its initialisers make to the arithmetic of their
+/// thread, as those of `-Ofast` do, end with that thread. If no thread can be started, it is opened in this one.
 fn apart<T: Send>(path: &Path, open: impl Fn() -> T + Sync) -> T {
     let watched = || {
         let did_flush = flushes();

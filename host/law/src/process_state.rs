@@ -1,7 +1,6 @@
-//! State of the whole process that a law may change: the working
-//! folder, the limits, the standard streams. It is looked at after a law was built and before
-//! results are written, and set back as it was at the start. What is found while a library is loaded is reported with the
-//! first law of it that is built.
+//! State of the whole process that a law may change: the working folder, the limits, the standard streams. It is
+//! checked after a law is built and before results are written, and restored as it was at the start. Changes made while
+//! a library is loaded are reported with the first of its laws that is built.
 
 use std::io;
 use std::path::PathBuf;
@@ -37,10 +36,11 @@ pub fn begin() {
     });
 }
 
-/// What is to be reported of libraries, and whether it was said. Of the whole process: a library is loaded for all of it.
+/// Remarks on libraries, and whether each was reported. They belong to the whole process, as a library is loaded for
+/// all of it.
 static REMARKS: Mutex<Vec<(String, bool)>> = Mutex::new(Vec::new());
 
-/// Has this said once, however often it is found.
+/// Keeps a remark to be reported once, however often it is found.
 pub(crate) fn remark(words: String) {
     let mut all = REMARKS.lock().unwrap_or_else(PoisonError::into_inner);
     if !all.iter().any(|(known, _)| *known == words) {
@@ -48,7 +48,7 @@ pub(crate) fn remark(words: String) {
     }
 }
 
-/// What is to be reported of libraries that this process has loaded, and was not said yet.
+/// Remarks on libraries that this process has loaded, without those already reported.
 pub fn remarks() -> Vec<String> {
     let mut all = REMARKS.lock().unwrap_or_else(PoisonError::into_inner);
     let new = all.iter_mut().filter(|(_, is_said)| !is_said);
@@ -59,7 +59,7 @@ pub fn remarks() -> Vec<String> {
     .collect()
 }
 
-/// Sets it back. Says what had been changed.
+/// Restores it. Returns what had been changed.
 ///
 /// # Errors
 /// What cannot be set back.

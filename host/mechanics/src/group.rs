@@ -223,8 +223,8 @@ pub struct Group {
     pub strain: Field,
     /// Stresses (zero thickness: tractions) in axes of the elements.
     pub stress: Field,
-    /// What exact integration adds to the tractions that an interface began with, point by point; empty where that is
-    /// nothing. Elements carry it next to the law's answer, so that ground at rest stays at rest.
+    /// Exactly integrated tractions that an interface began with, less those at its points; empty if equal. Elements
+    /// carry the difference next to the law's answer, so that ground at rest stays at rest.
     correction: Vec<f64>,
     /// Internal variables of the law.
     pub internal: Field,
@@ -234,7 +234,7 @@ pub struct Group {
     pub moment: Moment,
     /// Calls of the laws used so far; the last one is that of the current law.
     pub law_calls: Vec<LawCalls>,
-    /// It is there: it has stiffness, weight and stress.
+    /// It has stiffness, weight and stress.
     pub is_active: bool,
     layer: Option<Layer>,
     /// Pore water that follows the deformation, if it does or did.
@@ -250,8 +250,7 @@ pub struct Group {
     tangents_are_constant: bool,
     /// Where tangents come from.
     origin: Origin,
-    /// The trial state is what the law, which starts now, makes of the committed one over a nil
-    /// increment.
+    /// The trial state is the answer of the law, which starts now, to the committed one over a zero increment.
     is_asked: bool,
     /// What its law started as.
     bond: Bond,

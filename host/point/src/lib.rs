@@ -1,8 +1,8 @@
 //! One law along a path at one integration point, in memory, with mixed control of its components.
 //!
-//! A [`Driver`] leads a point through [`Segment`]s; each component follows a gradient (a jump or
-//! strain), a flux (a traction or stress), or a stiffness ([`Control`]). [`Driver::run`] follows the
-//! path and hands out a [`Row`] for each increment.
+//! A [`Driver`] leads a point through [`Segment`]s. Each component follows a gradient (a jump or
+//! strain), a flux (a traction or stress), or a stiffness ([`Control`]). The path is followed by
+//! [`Driver::run`], which hands out a [`Row`] for each increment.
 //!
 //! Units are m and kPa, shear strains are γ = 2ε; opening and tension are positive. Components are
 //! those of the law's [hypothesis](abi::Hypothesis::components), in their order; arrays over them

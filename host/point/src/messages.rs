@@ -300,7 +300,7 @@ impl Display for Warning {
 }
 
 impl Moved {
-    /// What it is a flux of, and both fluxes by component.
+    /// Name of the flux, and both fluxes by component.
     fn in_words(&self) -> (&'static str, String, String) {
         let components = self.hypothesis.components();
         let list = |flux: &[f64]| {

@@ -1,5 +1,5 @@
-//! Curves of probes, of stresses along a cut or of what holds along a pile, and measured points beside
-//! them, as SVG.
+//! Figures as SVG: curves of probes, of stresses along a cut or of quantities along a pile, with
+//! measured points.
 
 use crate::output_request::{Cut, Figure, Measured};
 use crate::pile::Station;

@@ -296,8 +296,8 @@ impl PointQuantity {
         }
     }
 
-    /// What a point stands for: its volume; of tractions, jumps and internal variables of a layer
-    /// or interface its area (in axisymmetry of the whole turn).
+    /// Weight of a point: its volume, or for tractions, jumps and internal variables of a layer or
+    /// interface its area (in axisymmetry of the whole turn).
     pub fn weight(&self, group: &Group, point: usize) -> f64 {
         let weight = group.kinematics.weight(point);
         match (self, group.thickness(point)) {

@@ -49,16 +49,16 @@ pub fn default_path(folders: &[PathBuf]) -> PathBuf {
     }
 }
 
-/// What a process has written into a results folder and still knows: a report of it does not read that again,
-/// which for the profiles of `cases/chamber_mesh1` is a tenth of the instructions of the whole run.
+/// Results that a process has written into a folder and still knows, so that a report need not read them
+/// again. For the profiles of `cases/chamber_mesh1` that saves a tenth of the instructions of the whole run.
 #[derive(Debug, Default)]
 pub struct Known {
     /// Length of `profile.csv`, and what is shown of it.
     pub(crate) profile: Option<(u64, Profiles)>,
 }
 
-/// The report of a run, or of a study, that is under way: written again at most once a second, and so seldom
-/// that it takes about a hundredth of the time; marked, and reloading itself.
+/// The report of a run, or of a study, that is under way. It is marked as such and reloads itself. It is
+/// rewritten at most once a second, and so seldom that this takes about a hundredth of the time.
 #[derive(Debug)]
 pub struct Running {
     folder: PathBuf,
@@ -67,7 +67,7 @@ pub struct Running {
 
 /// Least time between two of them; a shorter run has no interim report.
 const EVERY: Duration = Duration::from_secs(1);
-/// So many times as long as writing one takes, none is written.
+/// The pause after a report, in times that writing it took.
 const SELDOM: u32 = 100;
 
 impl Running {

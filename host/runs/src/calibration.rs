@@ -1,7 +1,7 @@
 //! Parameters of laws from measured curves: `pilum calibrate`.
 //!
-//! A calibration names drivers and cases with what was measured in them. [`run`] is the command: it
-//! looks for the values whose curves come nearest, by least squares from several starts, and says how
+//! A calibration names drivers and cases with what was measured in them. The command [`run`] looks
+//! for the values whose curves come nearest, by least squares from several starts, and reports how
 //! well the tests determine them.
 
 mod cache;
@@ -99,7 +99,7 @@ pub struct Outcome {
 pub struct Interval {
     /// Its ends; `None` where absent, or none is known.
     pub ends: [Option<f64>; 2],
-    /// What becomes of an end that is `None`.
+    /// Meaning of an end that is `None`.
     pub open: [Open; 2],
     /// From the profile, else from the covariance.
     pub is_of_profile: bool,

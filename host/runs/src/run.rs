@@ -349,7 +349,7 @@ fn carry_out(
     Ok(results.figures().clone())
 }
 
-/// Whoever follows a simulation into its folder, and shows how it goes.
+/// Records a simulation in its folder, and shows how it goes.
 struct Follower<'a> {
     observer: &'a mut dyn Observer,
     results: Recorder,

@@ -1,8 +1,8 @@
 //! Cost of accuracy: `pilum trade-off`.
 //!
-//! A study runs a driver or a case under many settings and measures each against a reference that
-//! is finer than all of them and says how far it is converged. [`run`] is the command;
-//! [`reach`] goes the other way round and finds settings for an error that is asked for.
+//! A study runs a driver or a case under many settings. It measures each against a reference that
+//! is finer than all of them, and reports how far the reference is converged. The command is
+//! [`run`]; [`reach`] goes the other way round and finds settings for a requested error.
 
 mod accuracy;
 mod case_study;

@@ -1,8 +1,8 @@
 //! Files that people write, and the place of each mistake in them.
 //!
-//! A [`Source`] is a text with the files that it came from; [`parse`] turns it into values or an
-//! [`InputError`] that says file, line, key and what was expected; [`base`] lets files build on each
-//! other. Nothing here knows what the keys mean.
+//! A [`Source`] is a text with the files that it came from. The function [`parse`] turns it into
+//! values or an [`InputError`] with file, line, key and what was expected. With [`base`] files build
+//! on each other. Nothing here knows what the keys mean.
 
 pub mod base;
 mod error;

@@ -14,7 +14,7 @@ use toml::de::{DeString, DeTable, DeValue};
 /// A setting that was read.
 #[derive(Debug)]
 pub(crate) struct Setting<'i> {
-    /// Where it stands.
+    /// Its place.
     range: Range<usize>,
     keys: Vec<Spanned<DeString<'i>>>,
     value: Spanned<DeValue<'i>>,

@@ -53,8 +53,8 @@ use text::write::replace;
     reason = "switches of the command line"
 )]
 pub struct Arguments {
-    /// A library, of the contract or of a UMAT with a sidecar next to it, with `--driver` of a UDSM or of MFront
-    /// behaviours too; or the id of a law that is found as `pilum laws` finds it.
+    /// A library: of the contract, of a UMAT with a sidecar next to it, or, with `--driver`, of a UDSM or MFront
+    /// behaviours; or the id of a law, found as by `pilum laws`.
     #[arg(required_unless_present = "list")]
     library: Option<String>,
     /// Write JSON.
@@ -534,7 +534,7 @@ fn library_path(name: &str) -> Result<PathBuf, Error> {
         })
 }
 
-/// What is asked of `--set` before the checks: no check of the library.
+/// Requirement on `--set` before the checks: not a check of the library.
 static SETTINGS: Check = Check {
     id: "settings-fit",
     family: Family::Description,
@@ -543,7 +543,7 @@ static SETTINGS: Check = Check {
     run: specimen::settings_fit,
 };
 
-/// What is asked of `--driver` before the checks.
+/// Requirement on `--driver` before the checks.
 static DRIVER: Check = Check {
     id: "driver-fits",
     family: Family::Description,

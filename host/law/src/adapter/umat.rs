@@ -156,9 +156,9 @@ impl ForeignLaw for Umat {
 /// Numbers of components.
 #[derive(Clone, Copy, Debug)]
 struct Sizes {
-    /// Of the hypothesis.
+    /// Components of the hypothesis.
     n: usize,
-    /// Of the call: NTENS.
+    /// Components of the call: NTENS.
     n_tens: usize,
     /// NDI.
     n_normal: usize,

@@ -98,7 +98,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// The message up to its NUL; `None` if it has none.
+    /// The message up to its NUL; `None` without a NUL.
     pub fn text(&self) -> Option<String> {
         terminated(&self.message)
     }
@@ -362,7 +362,7 @@ pub struct CreateForm<'a> {
     pub lacks_tangent: bool,
 }
 
-/// What `create` has left behind.
+/// Result of `create`.
 #[derive(Debug)]
 pub struct Created {
     /// What it returned.
@@ -374,7 +374,7 @@ pub struct Created {
 }
 
 impl Created {
-    /// The message up to its NUL; `None` if it has none.
+    /// The message up to its NUL; `None` without a NUL.
     pub fn text(&self) -> Option<String> {
         terminated(&self.message)
     }

@@ -26,7 +26,7 @@ const SHARED: [&str; 8] = [
 /// Bytes before the binding in an entry of the table.
 const BINDING: u64 = 4;
 
-/// Where the binding of such a variable stands, with its type, and its name.
+/// Offset in the file of the binding of such a variable, its type, and its name.
 type Unique = (u64, u8, String);
 
 /// Makes them ordinary in a copy of the library at `path`. A file that cannot be read as one is left to the loader.

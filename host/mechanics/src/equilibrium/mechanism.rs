@@ -1,4 +1,4 @@
-//! What gives way where no equilibrium is found: the point, and how, where most is out of balance.
+//! Mechanism of a step without equilibrium: the point that gives way where the residual is largest, and how.
 
 use super::newton::PointPlace;
 use crate::group::{FailureMode, Group};
@@ -42,8 +42,8 @@ impl fmt::Display for Mechanism {
 /// Jumps of all points of groups, by the group's number.
 pub(super) type Jumps = Vec<(usize, Vec<f64>)>;
 
-/// What gives way in the trial state of the groups under iteration, whose residual is given by degree of freedom; points
-/// whose traction breaks off since an earlier iterate, with these jumps by group, are told from others.
+/// Finds what gives way in the trial state of the groups under iteration. `residual`: by degree of freedom. `before`:
+/// jumps of an earlier iterate by group; points whose traction has broken off since are distinguished from others.
 pub(super) fn find(
     groups: &[Group],
     includes: impl Fn(usize) -> bool,

@@ -22,8 +22,8 @@ pub struct Columns<'m> {
 }
 
 impl<'m> Columns<'m> {
-    /// Of a mesh whose groups have these unit weights (above and below the water, kN/m³); `None`
-    /// for an inactive group.
+    /// Columns of a mesh whose groups have these unit weights (above and below the water, kN/m³); `None` for an
+    /// inactive group.
     pub fn new(
         mesh: &'m Mesh,
         water: Option<&'m Water>,
@@ -183,8 +183,8 @@ impl<'m> Columns<'m> {
     }
 }
 
-/// Whether the vertical at x crosses a piece of an outline between these. Of two pieces that share an end
-/// the vertical through it crosses both or none where they turn back there, and else one.
+/// Whether the vertical at x crosses a piece of an outline between these. The vertical through the common end of two
+/// pieces crosses one of them, or both or neither if they turn back there.
 fn crosses(start: f64, end: f64, x: f64) -> bool {
     (start <= x) != (end <= x)
 }

@@ -1,6 +1,7 @@
 //! Points of interfaces whose traction breaks off on the way from one trial state to another.
 //!
-//! The host knows no law, and asks it: a traction that changes over a vanishing part of the way has lost what it carried.
+//! The host knows no law, and asks it: a traction that changes over a vanishing part of the way has lost what it
+//! carried.
 
 use super::Group;
 use super::broken_bonds::SLIP;
@@ -33,8 +34,8 @@ impl Group {
         self.gradient().trial.clone()
     }
 
-    /// Whether the traction of a point breaks off between these jumps of all points and those of the trial state. The way
-    /// takes no time.
+    /// Whether the traction of a point breaks off between these jumps of all points and those of the trial state. The
+    /// way takes no time.
     pub fn breaks(&self, point: usize, jumps: &[f64], time: f64) -> bool {
         self.finds_break(point, jumps, time).unwrap_or(false)
     }

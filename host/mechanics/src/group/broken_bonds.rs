@@ -1,5 +1,5 @@
-//! Bonds that the first tension breaks, where no normal stress keeps them: what their points do is decided by tractions
-//! as small as rounding.
+//! Bonds without normal stress that break at the first tension: tractions as small as round-off decide what their
+//! points do.
 
 use super::Group;
 use law::{End, Operator, Start, Strided};
@@ -13,14 +13,14 @@ const TRACE: f64 = 1e-12;
 /// State of an interface's bond.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Bond {
-    /// Kept by a normal stress or a tensile strength, or none; or what has become of it has been said.
+    /// Kept by a normal stress or a tensile strength, or no bond, or reported already.
     #[default]
     Other,
-    /// The first tension breaks it, and no stress is there that keeps it.
+    /// The first tension breaks it, and no normal stress keeps it.
     Bare,
 }
 
-/// A bond that began so, and what has become of it.
+/// A bond that began bare, and what has become of it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BrokenBond {
     /// The group.
@@ -63,9 +63,9 @@ fn is_nothing(traction: &[f64]) -> bool {
 }
 
 impl Group {
-    /// What has become of a bond that began so, once: where points have opened, and those that have not carry more shear
-    /// than normal traction (where pressure holds them the others have been lifted off); where no equilibrium was
-    /// `reached`, as long as nothing presses it together.
+    /// Reports a bare bond in two cases. Points have opened, and the others carry no more normal traction than shear
+    /// (if pressure held these, the open ones were lifted off). Or no equilibrium was `reached`, no point is open, and
+    /// some carry no normal traction.
     pub fn torn(&mut self, reached: bool) -> Option<BrokenBond> {
         if self.bond != Bond::Bare {
             return None;
@@ -90,8 +90,8 @@ impl Group {
         })
     }
 
-    /// What holds where most points have no normal traction, and the law carries shear there that a trace of opening
-    /// takes away. (At the surface of ground a point or two have none.)
+    /// State of the bond: bare if most points have no normal traction, and the law carries shear there that a trace of
+    /// opening takes away. At the surface of ground a point or two without normal traction are usual.
     pub(super) fn bond(&self) -> Bond {
         let law = &self.law.built.law;
         let is_plain = law.library().foreign().is_none() && law.loaded().shear_zone().is_none();

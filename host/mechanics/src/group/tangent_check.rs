@@ -1,6 +1,5 @@
-//! Whether a law's tangents are the derivatives of its stresses: all points are tried in one direction, and a
-//! few of those where they do not fit are held against differences of the law's own answers about the
-//! increment that they went through last.
+//! Whether a law's tangents are the derivatives of its stresses. All points are tested in one direction. At a few of
+//! those that fail, tangents are compared with differences of the law's own answers about their last increment.
 //!
 //! If both sides and two sizes of differences agree, the stress has a derivative, and the tangent
 //! has to equal it. At a kink, or in noise, they differ, and the tangent is not judged.
@@ -17,15 +16,15 @@ const ABSURD: f64 = 1.0;
 /// scatter of the slopes.
 const OFF: f64 = 5e-3;
 const BEYOND: f64 = 4.0;
-/// Points that move most, and others, each as many, out of those that are suspected.
+/// Looked at are this many of the suspected points, those that move most, and at most as many others.
 const POINTS: usize = 6;
-/// So many points at least, and this share of those where the stress has a derivative, make a law's tangents
-/// wrong.
+/// A law's tangents are wrong if they are off at this many points or more, and at this share of those where the stress
+/// has a derivative.
 const SEVERAL: usize = 2;
 const SHARE: f64 = 0.3;
-/// After this many checks that found them wrong, or right without a break, steps that reach
-/// equilibrium are no longer checked.
+/// After this many checks that found them wrong, slow steps are no longer checked.
 const TWICE: u8 = 2;
+/// After this many in a row that found them right, only steps without equilibrium are checked.
 const OFTEN: u8 = 8;
 
 /// How far tangents are from the derivatives of the stresses.
@@ -78,8 +77,8 @@ impl std::fmt::Display for Notice {
 }
 
 impl Group {
-    /// Looks at the tangents of the law after a step, if it is not known yet what they are worth. Says so
-    /// when they have turned out not to be derivatives, and again when differences take their place.
+    /// Checks the tangents of the law after a step, unless their quality is known. Gives notice when they have turned
+    /// out not to be derivatives, and again when differences take their place.
     pub fn look(&mut self, period: (f64, f64), went: Went) -> Option<Notice> {
         let Origin {
             differences,
@@ -116,8 +115,7 @@ impl Group {
         })
     }
 
-    /// How far the law's tangents are off at some of the points where they are not what the stresses do in
-    /// one direction.
+    /// How far the law's tangents are off at some of the points that fail the test in one direction.
     fn deviation(&self, period: (f64, f64)) -> Deviation {
         let mut all = Deviation::default();
         for point in self.suspects(period).unwrap_or_default() {
@@ -133,8 +131,8 @@ impl Group {
         all
     }
 
-    /// Points whose tangents are not what the stresses do in one direction: those that move most, and some
-    /// of the others. `None` if they cannot be judged.
+    /// Points whose tangents fail the test in one direction: those that move most, and some of the others. `None` if
+    /// they cannot be judged.
     fn suspects(&self, period: (f64, f64)) -> Option<Vec<usize>> {
         let n = self.law.built.law.n_components();
         let gradient = self.gradient();

@@ -45,7 +45,8 @@ impl Problem {
 }
 
 impl Compatibility {
-    /// The first difference that keeps a state of one problem, in a phase, from being one of another; `None` if they are compatible.
+    /// The first difference that keeps a state of one problem, in a phase, from being one of another; `None` if they
+    /// are compatible.
     pub fn unlike(&self, other: &Self, phase: usize) -> Option<Incompatibility> {
         if self.mesh != other.mesh {
             return Some(Incompatibility::Mesh);

@@ -184,7 +184,7 @@ impl<'a> Constraints<'a> {
         Ok(())
     }
 
-    /// What is held in a phase: with one of some degrees of freedom that move alike all are.
+    /// Degrees of freedom held in a phase; if one of several that move alike is held, all are.
     fn held_in(&self, number: usize, active: &[bool]) -> HashMap<usize, Holder> {
         let mut held = self.held.clone();
         let alike = TiedDofs::in_phase(self.problem, number, |group| active[group]);

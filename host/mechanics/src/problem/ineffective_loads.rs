@@ -1,4 +1,4 @@
-//! Loads that act where something holds what they act upon: they change nothing but reactions.
+//! Loads on held or prescribed degrees of freedom: they change nothing but reactions.
 
 use super::constraints::line;
 use super::{Axis, Cause, Item, Phase, Problem, Refusal};
@@ -19,7 +19,7 @@ pub(super) enum Holder {
 struct Load<'p> {
     item: Item,
     line: &'p str,
-    /// Of a force.
+    /// Direction of a force; `None` for a pressure.
     axis: Option<Axis>,
 }
 
@@ -36,7 +36,7 @@ impl Load<'_> {
     }
 }
 
-/// Refuses loads that do nothing as long as they last; returns how much of others is lost so. `held`: what is held in
+/// Refuses loads that have no effect as long as they last; returns how much of others is lost. `held`: what is held in
 /// each phase, and by what.
 pub(super) fn check(
     problem: &Problem,
@@ -140,7 +140,7 @@ fn lost(
     )))
 }
 
-/// The components in which an edge faces, of its ends and middle.
+/// The components in which an edge with these ends and middle faces.
 fn faced(at: &[[f64; 2]; 3]) -> Vec<usize> {
     // What the edge faces, by component: the other one of its directions.
     let reach = |c: usize| {

@@ -1,10 +1,10 @@
-//! What acts on lines along which interfaces stand: on which of their faces?
+//! Loads and supports on lines along interfaces: on which face do they act?
 
 use super::check::edges_there;
 use super::{Axis, Cause, Item, Problem, Refusal};
 use std::collections::HashMap;
 
-/// What is reported of a line.
+/// A support, displacement or force on a line.
 struct Said<'p> {
     what: &'static str,
     line: &'p str,
@@ -13,8 +13,8 @@ struct Said<'p> {
     acts: [bool; 2],
 }
 
-/// Refuses forces, displacements and supports of lines along which an interface is there, on whose two faces they would
-/// act alike: where they are reported, or where a phase brings the interface.
+/// Refuses forces, displacements and supports on lines along an active interface: they would act on both of its faces.
+/// Names the input, or the activation of the interface if the phase brings it.
 pub(super) fn check(problem: &Problem) -> Result<(), Refusal> {
     let mesh = &problem.mesh;
     let joints = mesh.joints.iter().flat_map(|joint| {

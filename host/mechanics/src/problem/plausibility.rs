@@ -162,7 +162,7 @@ fn light(problem: &Problem) -> Vec<String> {
     light.collect()
 }
 
-/// What is reported of ground and has no effect.
+/// Warnings of input for ground that has no effect.
 fn lost(problem: &Problem) -> Vec<String> {
     let mut warnings = Vec::new();
     for phase in &problem.phases {
@@ -187,7 +187,7 @@ fn lost(problem: &Problem) -> Vec<String> {
     warnings
 }
 
-/// Interfaces next to undrained ground: their tractions are effective towards the hydrostatic pressure alone.
+/// Interfaces next to undrained ground: their tractions are effective with respect to hydrostatic pressure only.
 fn beside_undrained(problem: &Problem) -> Vec<String> {
     let mesh = &problem.mesh;
     let is_undrained = |number: usize| {

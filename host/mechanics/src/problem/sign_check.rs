@@ -3,12 +3,11 @@
 use crate::problem::Formulation;
 use law::{Law, Operator};
 
-/// A zero increment that changes a stress by more than this fraction of it does not stand it.
+/// A law rejects a stress that it changes by more than this fraction over a zero increment.
 const NOTABLE: f64 = 0.01;
 
-/// What the law makes of a stress (11 22 33 12, tension positive) that it cannot stand, if it can
-/// stand the same one with all normal components as compression. Else `None`: the law takes it as
-/// it is, or signs are not the reason.
+/// Why the law rejects a stress (11 22 33 12, tension positive), if it accepts the same one with all normal components
+/// as compression. `None`: the law accepts it, or signs are not the reason.
 pub(crate) fn turned(law: &Law, formulation: Formulation, stress: [f64; 4]) -> Option<String> {
     let normal = &stress[..3];
     if normal.iter().all(|&s| s <= 0.0) {

@@ -12,7 +12,7 @@ struct Load<'p> {
     stands: Stands,
 }
 
-/// Where a load stands.
+/// Ground next to a loaded line.
 #[derive(Clone, Copy, PartialEq)]
 enum Stands {
     OnGround,
@@ -39,7 +39,7 @@ impl Force {
     }
 }
 
-/// What becomes of loads as ground goes and comes, in words.
+/// Warnings of loads that go and come back with their ground.
 pub(super) fn warnings(problem: &Problem) -> Vec<String> {
     let joints = problem.mesh.joints.iter().flat_map(|joint| {
         let (minus, plus) = (joint.minus[2], joint.plus[2]);

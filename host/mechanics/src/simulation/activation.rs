@@ -1,9 +1,9 @@
 //! Stress with which interfaces appear in ground that carries loads.
 //!
-//! The stress at an interface is a mean of its neighbours' points. If that is not linear, its nodal
-//! forces differ from those which the tied faces exchanged. So the tractions are
-//! changed, as little as can be, until they are: min Σ w |Δt|² with Bᵀ w Δt = r, for the points' weights w and
-//! what the nodes lack of balance r. Then nothing moves when the interface appears.
+//! The stress at an interface is a mean of its neighbours' points. If that is not linear, its nodal forces differ from
+//! those which the tied faces exchanged. So the tractions get the smallest change that restores balance: min Σ w |Δt|²
+//! with Bᵀ w Δt = r, for the points' weights w and the residual r of the nodes. Then nothing moves when the interface
+//! appears.
 
 use super::Simulation;
 use crate::assembly::{Tie, fold};
@@ -11,15 +11,14 @@ use crate::equilibrium::norm;
 use crate::error::Error;
 use crate::group::Group;
 
-/// Part of what is lacking at which it counts as found.
+/// The iterations end when the gradient has fallen to this fraction.
 const FOUND: f64 = 1e-14;
-/// Iterations are few: the equations are scaled, and each node has its own.
+/// Most iterations. Few are needed: the equations are scaled, and each node has its own.
 const MOST: usize = 500;
 
 impl Simulation {
-    /// What has to be added to the tractions of interfaces that have just appeared, group by group, so that no
-    /// node of theirs is out of balance; nothing where they are in balance, to the tolerance of
-    /// the phase before.
+    /// Tractions to be added to interfaces that have just appeared, group by group, so that their nodes are in balance.
+    /// Nothing if they already are, within the force tolerance.
     pub(super) fn lacking(
         &self,
         number: usize,
@@ -39,7 +38,7 @@ impl Simulation {
         let play = norm(&lacking).max(norm(&internal));
         let both = lacking.iter_mut().zip(&internal);
         both.for_each(|(lacking, internal)| *lacking -= internal);
-        // What is held passes on nobody knows what.
+        // Forces at held degrees of freedom are unknown.
         let held = self.prescribed.keys().map(|&dof| (dof, 0.0, 0.0)).collect();
         let tied = self.tied_in(number, held)?;
         let held: Vec<usize> = tied.prescribed.iter().map(|&(dof, ..)| dof).collect();
@@ -53,11 +52,11 @@ impl Simulation {
     }
 }
 
-/// Forces at the faces of some interfaces as equations: those of what follows others are theirs.
+/// Equations of the forces at the faces of some interfaces; tied degrees of freedom pass theirs to their masters.
 struct Faces<'a> {
     groups: &'a [&'a Group],
     ties: &'a [Tie],
-    /// Factor of the force at every degree of freedom; none where something holds it, or no face is.
+    /// Factor of the force at every degree of freedom; 0 where something holds it, or without a face.
     scale: Vec<f64>,
     /// Square roots of the weights of the points, by group.
     roots: Vec<Vec<f64>>,

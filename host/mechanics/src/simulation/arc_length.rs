@@ -145,8 +145,8 @@ impl Simulation {
         Ok(PathEnd::Stopped(Box::new(reason.into()), course.highest))
     }
 
-    /// A step by the load under arc-length control, unless it has leapt over a piece of the path:
-    /// then the points that the path is measured by have moved much farther than in the last step.
+    /// A step by the load under arc-length control, unless it has leapt over a piece of the path. In a leap the points
+    /// that measure the path move much farther per load than in the last step.
     pub(super) fn without_leap(
         &self,
         attempt: Result<StepSuccess, StepFailure>,

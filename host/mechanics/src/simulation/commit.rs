@@ -37,9 +37,9 @@ impl Simulation {
         }
     }
 
-    /// Completes the state at the phase's load factor: what a linear domain left out of the iterations, and
-    /// the reactions (internal less external forces, by degree of freedom). Where only a part is
-    /// `looked_at`, the rest of the domain may stay where it was.
+    /// Completes the state at the phase's load factor: the linear domain, which the iterations leave out, and the
+    /// reactions (internal less external forces, by degree of freedom). If only a part is `looked_at`, the rest of the
+    /// domain may keep its earlier state.
     ///
     /// # Errors
     /// Why the domain is not in equilibrium.

@@ -1,8 +1,9 @@
-//! How far from each other two ways lead that a step may take.
+//! How far apart two ways lead that a step may take.
 //!
-//! Motions that led to equilibrium, viscous relaxation or viscous control, are counted, and the first of each kind is told: where
-//! relaxation has found an equilibrium, Newton iterations from the tangent, and viscous control where they stand still, may find another
-//! one. If steps are cut back, iterations choose the steps: two halves of a step end elsewhere than the whole.
+//! Motions (viscous relaxation or viscous control) that led to equilibrium are counted, and the first of each kind is
+//! reported. After relaxation the step is repeated from its tangent, under viscous control if Newton iterations stand
+//! still: this may lead to another equilibrium. If steps are cut back, iterations choose the steps: two halves of a
+//! step may end elsewhere than the whole.
 
 use super::phase::PhaseEquations;
 use super::{Simulation, UnderWay, Warning, Watch};
@@ -38,8 +39,8 @@ pub enum Neighbour {
 }
 
 impl Simulation {
-    /// Counts a motion that led to equilibrium, and speaks of the first one of its kind; the phase's end says how
-    /// many there were.
+    /// Counts a motion that led to equilibrium, and reports the first one of its kind; the phase's end reports their
+    /// number.
     pub(super) fn note_motion(
         &mut self,
         success: &StepSuccess,
@@ -60,8 +61,8 @@ impl Simulation {
         }
     }
 
-    /// Says of the first step of a phase, in an increment that was cut, whose two halves lead elsewhere how far that is. Before it
-    /// may be steps in which nothing flows.
+    /// Reports the first step of a phase, in a cut increment, whose two halves end elsewhere, and how far. In steps
+    /// before it nothing may flow.
     pub(super) fn note_cut_back(
         &mut self,
         success: &StepSuccess,
@@ -82,7 +83,7 @@ impl Simulation {
         }
     }
 
-    /// Where a step leads on another way that ended in `success`, whose trial state is left unchanged. `None` if it was
+    /// Result of another way for a step that ended in `success`, whose trial state is left unchanged. `None` if it was
     /// stopped.
     fn neighbour(
         &mut self,
@@ -170,7 +171,8 @@ impl Simulation {
 
 /// Steps of a phase that are tried in two halves, at most.
 const MOST_HALVED: usize = 4;
-/// Two ways that lead a step no further from each other than this, as shares of what it changes, lead to one equilibrium.
+/// Two ways that lead a step no further from each other than this, as shares of what it changes, lead to one
+/// equilibrium.
 const SAME: f64 = 1e-6;
 
 impl Neighbour {

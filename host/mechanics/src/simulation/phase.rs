@@ -336,8 +336,9 @@ impl Simulation {
         Ok((equations, loads))
     }
 
-    /// The linear part of a phase and the equations of the rest, if it is to be condensed: the groups that stay
-    /// linear in the phases to come, which need no other factors then; where that does not pay, those that are now.
+    /// The linear part of a phase and the equations of the rest, if it is to be condensed. Preferred are the groups
+    /// that stay linear in the phases to come, which then need no other factors; if that does not pay, those that are
+    /// linear now.
     fn condensed(
         &mut self,
         number: usize,

@@ -22,8 +22,8 @@ pub struct PhaseRecord {
     pub iterations: usize,
     /// Steps repeated with a smaller length.
     pub cut_backs: usize,
-    /// Where two halves of a step lead in an increment that was cut: of the first one whose halves lead elsewhere, or the
-    /// last one tried.
+    /// Where two halves of a step lead in an increment that was cut: of the first one whose halves lead elsewhere, or
+    /// the last one tried.
     pub in_halves: Option<Neighbour>,
     /// Steps that were tried in two halves.
     pub halved: usize,
@@ -52,9 +52,11 @@ pub struct PhaseRecord {
     pub unsettled: f64,
     /// Steps along the path of equilibrium under arc-length control.
     pub arc_length: usize,
-    /// The first increment, from 1, in which viscous control led under `auto`, as steps by the load found no equilibrium.
+    /// The first increment, from 1, in which viscous control led under `auto`, as steps by the load found no
+    /// equilibrium.
     pub viscous_from: Option<usize>,
-    /// The first increment, from 1, in which viscous control led by single corrections, as nothing else found an equilibrium.
+    /// The first increment, from 1, in which viscous control led by single corrections, as nothing else found an
+    /// equilibrium.
     #[serde(default)]
     pub singly_from: Option<usize>,
     /// Matrices factorised.

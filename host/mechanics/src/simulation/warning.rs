@@ -54,7 +54,8 @@ pub enum Warning {
     },
     /// Relaxation led to the equilibrium of this increment, the first one of its phase; where another way leads.
     Relaxed(Place, Option<Neighbour>),
-    /// Steps of an increment were cut back; where two halves of a shorter one lead, the first of its phase that lead elsewhere.
+    /// Steps of an increment were cut back; where two halves of a shorter one lead, the first of its phase that lead
+    /// elsewhere.
     CutBack(Place, Neighbour),
     /// Viscous control, which the settings ask for, did so.
     Viscous(Place),

@@ -229,8 +229,7 @@ pub(super) fn of_stage(
 /// Ratio of two standard errors that is worth a word.
 const WIDER: f64 = 1.1;
 
-/// What is to be reported where parameters of earlier stages are held: how much of their errors goes into those
-/// of later ones.
+/// Report on held parameters of earlier stages: how much of their errors goes into those of later ones.
 pub(super) fn of_stages(
     model: &Model,
     stages: &[Stage],

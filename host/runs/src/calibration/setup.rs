@@ -330,8 +330,8 @@ impl<'a> Claim<'a> {
     }
 }
 
-/// What all names under `[fixed]` and `[free]` stand for. In a driver a name without `laws` goes before
-/// those that have some.
+/// Parameters that the names under `[fixed]` and `[free]` stand for. In a driver a name without `laws`
+/// takes precedence over those with `laws`.
 fn claims<'a>(
     calibration: &'a Calibration,
     laws: &'a [Vec<Known>],
@@ -390,7 +390,7 @@ fn claims<'a>(
     Ok(kept)
 }
 
-/// What drivers stand for is a table that some name belongs to.
+/// Checks that every driver's `stands_for` is a table that some name belongs to.
 fn check_stands_for(calibration: &Calibration) -> Result<(), Error> {
     let file = &calibration.file;
     let free = file.free.values().map(|input| &input.get_ref().laws);
@@ -885,9 +885,9 @@ fn bounds(law: Bounds, given: [Option<f64>; 2], start: f64, scale: Scale) -> [f6
     [lower, upper]
 }
 
-/// The range that other starts are spread over: between the given ends, else usual values, but not
-/// farther than three decades or ten times the start from it; from a start at nothing, than the range of
-/// usual values is wide.
+/// Range of other starts: between the given ends, else usual values within three decades (logarithmic
+/// scale) or ten times the start (linear scale) of it. A start of zero has the width of the usual range
+/// instead of ten times the start.
 fn range(
     bounds: [f64; 2],
     usual: Bounds,

@@ -1,11 +1,10 @@
 //! Settings that reach an accuracy: `accuracy = 0.01` in a case file.
 //!
-//! Increments are doubled from a quarter of the file's on until the estimated error of the finest
-//! run is below the target; of the runs made, the coarsest that is good enough is chosen, and where
-//! none is, the finest that came to its end. With `accuracy_with_mesh` half of the target is for that, and
-//! the rest for the mesh, which is refined until its error is below it. Every run is a
-//! row of `accuracy.csv` as soon as it is done, and kept, so that a study that is stopped goes on from
-//! there.
+//! Increments are doubled from a quarter of the file's on until the estimated error of the finest run is
+//! below the target. The coarsest run that is good enough is chosen, else the finest that came to its end.
+//! With `accuracy_with_mesh` half of the target is for that, and the rest for the mesh, which is refined
+//! until its error is below it. Every run is a row of `accuracy.csv` as soon as it is done, and kept, so
+//! that a study that is stopped goes on from there.
 
 mod levels;
 mod mesh;

@@ -289,10 +289,10 @@ impl Specimen {
         Ok(walk)
     }
 
-    /// Leads points there and back: one component ahead in increments that grow from a part of the
-    /// elastic limit until the law has slid or strained a long way, others at constant flux, as in a
-    /// shear box or a triaxial cell. The path goes beyond some slip, whatever the stiffness, and
-    /// each way back begins with small increments to include unloading.
+    /// Leads points there and back. One component advances in increments that grow from a part of
+    /// the elastic limit until the law has slid or strained a long way. The others keep their flux,
+    /// as in a shear box or a triaxial cell. The path goes beyond some slip, whatever the stiffness,
+    /// and each way back begins with small increments to include unloading.
     fn lead(
         &self,
         walk: &mut Walk,

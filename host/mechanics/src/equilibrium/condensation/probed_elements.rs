@@ -1,8 +1,8 @@
-//! Elements that results look at in groups that they do not look at otherwise, such as those at a pile's head and
-//! toe: brought to the latest state, and taken back to the complete one before the groups follow as a whole.
+//! Excerpts: elements that results need from groups that they do not need otherwise, such as those at a pile's head and
+//! toe. They are brought to the latest state, and taken back to the complete one before their groups follow as a whole.
 //!
-//! A complete state holds residuals against the tolerance, and corrects its displacements; that of an excerpt
-//! follows from the boundary alone.
+//! For a complete state residuals are checked against the tolerance and displacements corrected; the state of an
+//! excerpt follows from the boundary alone.
 
 use super::probed_part::{Goal, Part};
 use super::{CheckedPoints, LinearDomain, Standing};
@@ -25,7 +25,7 @@ pub(super) struct Excerpt {
 /// Elements that are in the latest state.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(super) struct Ahead {
-    /// So many increments since the complete state.
+    /// Increments since the complete state.
     increments: usize,
     /// Numbers of their groups, and theirs there.
     elements: Vec<(usize, Vec<usize>)>,

@@ -74,8 +74,8 @@ impl Part {
     }
 }
 
-/// Share of ε ‖diag K_bb‖ u that rounding of a motion u of the boundary leaves of forces there: 0.35 to 0.5 in six chambers,
-/// up to 1.1 in those with a toe of tiny elements.
+/// Share of ε ‖diag K_bb‖ u that rounding of a motion u of the boundary leaves of forces there: 0.35 to 0.5 in six
+/// chambers, up to 1.1 in those with a toe of tiny elements.
 const ROUNDED: f64 = 0.5;
 
 impl LinearDomain {
@@ -186,9 +186,9 @@ impl LinearDomain {
         }
     }
 
-    /// Trial state of a part in equilibrium with its goal and where the boundary is: its internal
-    /// forces, and the displacement increments since the latest state if the part is in that one, else since
-    /// the complete one. Displacements are filled in.
+    /// Brings a part into a trial state in equilibrium with its goal and the positions of the boundary. Fills in
+    /// displacements. Returns internal forces and displacement increments: since the latest state if the part is in
+    /// that one, else since the complete one.
     pub(super) fn settle(
         &mut self,
         part: &Part,
@@ -229,10 +229,9 @@ impl LinearDomain {
         Ok((internal, increment))
     }
 
-    /// Trial state of a part's groups in equilibrium with its goal, from a motion that corrections are added to: what is
-    /// left out of balance and had to be taken for round-off, relative, and internal forces. A
-    /// correction counts from the state that it corrects, since rounding of the whole motion would
-    /// hide it: then the state that was
+    /// Brings a part's groups into a trial state in equilibrium with its goal, from a motion that corrections are added
+    /// to. Returns the relative residual that had to be taken for round-off, and internal forces. A correction counts
+    /// from the state that it corrects, since rounding of the whole motion would hide it; then the state that was
     /// `committed` before is handed out.
     fn balance(
         &self,
@@ -273,8 +272,7 @@ impl LinearDomain {
                 if is_round_off && relative <= STILL_SMALL {
                     return Ok((relative, internal));
                 }
-                // All forces there are, are what rounding leaves of none: a body that was moved as
-                // a whole.
+                // All forces are round-off: the body was moved as a whole.
                 if is_round_off && ACCEPTED_ROUND_OFF * last_bit >= 1.0 {
                     return Ok((0.0, internal));
                 }

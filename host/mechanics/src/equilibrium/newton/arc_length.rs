@@ -10,7 +10,8 @@
 //! the last step: a local, linear arc length (Riks 1979; de Borst 1987; Geers 1999). It is blind to
 //! motions of a body as a whole. The load factor is the unknown that goes with it,
 //!
-//! - K δ_r = r, K δ_q = q = dr/dλ (prescribed displacements included, also in δ_q), dλ = (s − c·(Δu + δ_r)) / c·δ_q, δ = δ_r + dλ δ_q.
+//! - K δ_r = r, K δ_q = q = dr/dλ (prescribed displacements included, also in δ_q), dλ = (s − c·(Δu + δ_r)) / c·δ_q,
+//!   δ = δ_r + dλ δ_q.
 
 use super::failure::{Iterations, Reason, StepFailure};
 use super::iterate::{Control, Correction, State};
@@ -36,8 +37,8 @@ pub struct Measure {
 }
 
 impl Measure {
-    /// That of the direction of a step, given by its displacement increments (by place). `None` if no non-linear group has deformed. Interfaces alone count if there are
-    /// any: their jumps, in metres, cannot be added to strains.
+    /// That of the direction of a step, given by its displacement increments (by place). `None` if no non-linear group
+    /// has deformed. Interfaces alone count if there are any: their jumps, in metres, cannot be added to strains.
     pub fn new(groups: &[Group], places: &Places, increment: &[f64]) -> Option<Self> {
         let is_interface = |group: &&Group| group.formulation != Formulation::Solid;
         let nonlinear = || groups.iter().filter(|group| !group.is_linear());

@@ -118,9 +118,9 @@ impl Newton<'_> {
             || (expected <= tolerance && correction <= self.settings.displacement_tolerance)
     }
 
-    /// Whether a state whose tangent is singular is in equilibrium all the same, by the matrix at
-    /// the start of the step: a layer that has just lost its contact, with it its stiffness, and
-    /// whose residual is round-off. The trial state stays.
+    /// Whether a state with a singular tangent is in equilibrium nevertheless, judged with the matrix at the start of
+    /// the step. Example: a layer has just lost contact and with it its stiffness, and the residual is round-off. The
+    /// trial state stays.
     pub(super) fn has_settled(
         &mut self,
         increment: &[f64],

@@ -1,7 +1,8 @@
 //! Steps whose load factor is given: the strategies of Newton's method under load control.
 //!
-//! A standstill is [relaxed](super::viscous_relaxation) or [viscous](super::viscous_control) away; a [kept matrix](super::matrix_reuse) is tried before that of
-//! the present state; slow corrections are [accelerated](super::acceleration).
+//! A standstill is left by [viscous relaxation](super::viscous_relaxation) or [viscous control](super::viscous_control). A
+//! [kept matrix](super::matrix_reuse) is tried before that of the present state; slow corrections are
+//! [accelerated](super::acceleration).
 
 use super::acceleration::Acceleration;
 use super::failure::{Motion, StepFailure};
@@ -19,7 +20,8 @@ use law::Operator;
 /// increment: what moves on is a mechanism, however small its residual.
 const LAST: usize = 5;
 const STILL_MOVES: f64 = 0.1;
-/// It is not tolerated if the displacement increments are more than this many times those at the start of the iterations.
+/// It is not tolerated if the displacement increments are more than this many times those at the start of the
+/// iterations.
 const FAR: f64 = 5.0;
 /// Lengths of a correction that the line search tries.
 const STEP_LENGTHS: [f64; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];

@@ -1,11 +1,11 @@
 //! The kept matrix: as long as corrections with it take nearly all of the residual away, the matrix of
 //! an earlier iteration, or of the step before, is not replaced.
 //!
-//! If factorising is expensive, corrections with the matrix of the step before, and with the first one that replaces it,
-//! may also be slow: they are [accelerated](super::acceleration), and it is replaced where even so they stall.
+//! If factorising is expensive, corrections with the matrix of the step before, and with the first one that replaces
+//! it, may also be slow. They are [accelerated](super::acceleration), and the matrix is replaced only if they still
+//! stall.
 //!
-//! Whether another one is wanted is known before a state is evaluated; only then are laws asked for
-//! tangents.
+//! Whether a new matrix is wanted is known before a state is evaluated; only then are laws asked for tangents.
 
 use super::Newton;
 use super::acceptance::STALE;
@@ -26,9 +26,9 @@ const FAST: [f64; 2] = [0.03, 0.01];
 /// unknowns and 360 points slow iterations cost as much as the matrices they save; with 644 and 720
 /// a run takes 0.87 of its time.
 const DEAR: f64 = 2e5;
-/// There another matrix costs as much as this many corrections. Between 8 and 30 the time of a run differs by 4 %.
+/// If so, another matrix costs as much as this many corrections. Between 8 and 30 the time of a run differs by 4 %.
 const AS_MANY: f64 = 11.0;
-/// So many last corrections say how many more it takes.
+/// The number of further corrections is predicted from this many last ones.
 const LAST: usize = 3;
 
 /// Data of a step that decide whether the matrix is kept.
@@ -100,8 +100,8 @@ impl Newton<'_> {
         self.is_stale() || self.is_slow()
     }
 
-    /// Whether slow corrections have had their chance: by the progress of the last ones `since` the present matrix is
-    /// there it takes more than another one is worth, or they are half of all iterations that a step may take.
+    /// Whether slow corrections have to end. Either the last ones `since` the present matrix predict more of them than
+    /// a new matrix is worth, or the step has used more than half of its iterations.
     pub(super) fn is_too_slow(&self, iterations: &[Iteration], since: usize) -> bool {
         let is_half = 2 * iterations.len() > self.settings.max_iterations();
         let Some([before, .., last]) = iterations[since..].last_chunk::<{ LAST + 1 }>() else {

@@ -1,9 +1,9 @@
 //! References of a step: the forces and displacements that an iterate is measured against.
 //!
-//! Found out when it is asked for. In ordinary steps the loads or the last equilibrium already
-//! exceed a tenth of the forces in play, and nothing more is computed. Where they do not (a start
-//! without stress, a load that grows tenfold), the step is answered elastically once: with what the iterations hold
-//! factorised, if that is the elastic matrix, else with separate equations, so that the matrix stays unchanged.
+//! They are computed on demand. In ordinary steps the loads or the last equilibrium already exceed a tenth of the
+//! forces in play, and nothing more is computed. In other steps (a start without stress, a load that grows tenfold) the
+//! elastic response is computed once. It uses the factors of the iterations if these are elastic, else separate
+//! equations, so that the matrix stays unchanged.
 
 use super::Newton;
 use super::acceptance::{Change, Forces, MOVES};
@@ -14,7 +14,7 @@ use crate::group::Group;
 use algebra::{LinearSolver, Singular};
 use law::Operator;
 
-/// Bytes of a factorisation that is kept besides that of the iterations.
+/// Most bytes of a factorisation that is kept besides that of the iterations.
 const MOST_BESIDE: u64 = 1 << 28;
 
 /// Its value in the present step; by body.
@@ -34,7 +34,7 @@ pub(super) struct Given {
 /// The elastic answer to a step, by body.
 #[derive(Debug)]
 struct Elastic {
-    /// Forces that it calls forth.
+    /// Its forces.
     forces: Vec<f64>,
     /// Sizes of the displacement increments.
     moves: Vec<f64>,
@@ -59,8 +59,8 @@ impl Newton<'_> {
         norms(&bodies.of_place, bodies.n, by_place)
     }
 
-    /// Sizes of internal forces, by body: `internal` by place, from these stresses by group. If
-    /// bodies share a place, each gets the forces of its own elements there.
+    /// Norms of internal forces, by body: `internal` by place, from these stresses by group. At a shared place each
+    /// body gets the forces of its elements only.
     pub(super) fn forces_by_body(
         &mut self,
         internal: &[f64],
@@ -286,8 +286,8 @@ impl Newton<'_> {
         })
     }
 
-    /// Factorises the tangents at the start of a step in addition to the matrix that is held: the equations, if that one is
-    /// another, and the internal forces there.
+    /// Factorises the tangents at the start of a step in addition to the matrix that is held: the equations, if that
+    /// one is another, and the internal forces there.
     fn factorise_at_start(
         &mut self,
         operator: Operator,

@@ -8,15 +8,14 @@
 //! relaxation follows that motion with a
 //! viscosity proportional to the elastic stiffness,
 //!
-//!   α K_e u̇ = r(u),    an implicit step of unit time: (K + α K_e) δ = r,
+//!   α K_e u̇ = r(u),    an implicit step of unit time: (K + α K_e) δ = r.
 //!
-//! from the elastic answer to the step on, the residual growing where it must; if that leads nowhere,
-//! from where Newton iterations stood still. α follows the residual: steps of time grow longer as the
-//! motion slows down (pseudo-transient continuation: C. T. Kelley, D. E. Keyes, SIAM J. Numer. Anal.
-//! 35, 1998). The motion leaves
-//! equilibria that are not stable and ends at one that is. Newton iterations are tried whenever
-//! the residual has fallen; they alone decide on convergence, by the same tolerances. The motion
-//! changes the path within the step only: laws still see one increment from the last equilibrium.
+//! It starts from the elastic response to the step. The residual may grow. If that leads nowhere, the motion starts
+//! where Newton iterations stood still. Time steps grow as the motion slows down, since α follows the residual
+//! (pseudo-transient continuation: C. T. Kelley, D. E. Keyes, SIAM J. Numer. Anal. 35, 1998). The motion leaves
+//! unstable equilibria and ends at a stable one. Newton iterations are tried whenever the residual has fallen; they
+//! alone decide on convergence, by the same tolerances. The motion changes the path within the step only: laws still
+//! see one increment from the last equilibrium.
 
 use super::Newton;
 use super::failure::{Iterations, Reason, StepFailure};
@@ -38,9 +37,10 @@ const FOLLOWS: [f64; 2] = [0.3, 2.0];
 const FALL: f64 = 0.1;
 /// Viscous steps of one motion.
 const MAX_STEPS: usize = 40;
-/// A motion leads away if the residuals of this many last viscous steps are all more than this multiple of the least one
-/// before them. Found by trial: of 169 motions that led to Newton iterations, with the bored pile on 1 917 quads and 24 random
-/// piles, none had done so, and a quarter of the viscous steps of all others came after. With ten steps one would have been lost.
+/// A motion leads away if the residuals of this many last viscous steps are all more than this multiple of the least
+/// one before them. Found by trial: of 169 motions that led to Newton iterations, with the bored pile on 1 917 quads
+/// and 24 random piles, none had done so, and a quarter of the viscous steps of all others came after. With ten steps
+/// one would have been lost.
 const LEADS_AWAY: (usize, f64) = (12, 3.0);
 /// Newton iterations without a new least residual that count as a standstill.
 const STANDSTILL: usize = 6;
@@ -273,9 +273,8 @@ impl Newton<'_> {
         Err(Reason::Unmet(Iterations::Relaxation(motion.steps), unmet).into())
     }
 
-    /// Solves (K + α K_e) δ = residual with the tangents of the last evaluation, as
-    /// (K + α K_e)/(1 + α) δ = residual/(1 + α): where ground stays elastic its entries are those of
-    /// K_e whatever α is, bit for bit, and what they leave is taken over from the last matrix.
+    /// Solves (K + α K_e) δ = residual with the tangents of the last evaluation, divided by 1 + α. The entries of
+    /// elastic ground then equal those of K_e bit for bit, whatever α, so their Schur complements are reused.
     pub(super) fn viscous_correction(
         &mut self,
         residual: &[f64],

@@ -13,8 +13,8 @@ use std::collections::BTreeMap;
 
 /// Error of a tangent, relative to the largest stiffness. Differences are good to 10⁻⁶ or so.
 const TANGENT: f64 = 1e-4;
-/// Roundings of a flux, each of half a unit of the largest term in play, that two sides of a difference may
-/// have between them: a component of a solid is a sum of six terms.
+/// Roundings of a flux that the two sides of a difference may have together, each of half a unit in the
+/// last place of the largest term. A component of a solid is a sum of six terms.
 const NOISE: f64 = 6.0;
 
 /// What differences say of a tangent.

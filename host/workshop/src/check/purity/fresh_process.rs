@@ -11,7 +11,7 @@ use super::UPDATE;
 
 /// Points of a law that are called for in another process.
 const N: usize = 12;
-/// What processes are told of their surroundings, and is different in another one.
+/// Environment variables, with other values than usual.
 const VARIABLES: [(&str, &str); 6] = [
     ("HOME", "/nonexistent/home"),
     ("LANG", "tr_TR.UTF-8"),

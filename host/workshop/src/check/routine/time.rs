@@ -83,8 +83,8 @@ pub(super) fn time_as_declared(subject: &Subject) -> Found {
     Ok(format!("{n} increments"))
 }
 
-/// Whether other internal variables at the end of steps give another stress in a next increment like the last one:
-/// what is kept for its own sake, such as the length of substeps, does not count.
+/// Whether other internal variables at the end of steps give another stress in a next increment like the last one.
+/// Variables that do not change the stress, such as the length of substeps, do not count.
 fn carried_on(
     routine: &Specimen,
     steps: &[Step],
