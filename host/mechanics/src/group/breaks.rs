@@ -19,14 +19,16 @@ const SHORT: f64 = 1e-9;
 type Reached = (f64, Vec<f64>);
 
 impl Group {
-    /// Whether it is an interface with a bond that may break: its law carries shear without normal stress.
+    /// Whether it is an interface with a bond that may break: at some point its law carries shear without normal stress.
     pub fn may_break(&self) -> bool {
+        let is_bonded = |point| {
+            let traction = self.tried(point, [0.0, SLIP]);
+            traction.is_some_and(|traction| traction[1].abs() > 0.0)
+        };
         self.is_active
             && !self.is_linear()
             && self.law.built.law.n_components() == 2
-            && self
-                .tried([0.0, SLIP])
-                .is_some_and(|traction| traction[1].abs() > 0.0)
+            && (0..self.kinematics.n_points()).any(is_bonded)
     }
 
     /// Jumps of the trial state, of all points.

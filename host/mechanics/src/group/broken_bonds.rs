@@ -104,7 +104,7 @@ impl Group {
         if 2 * kept >= self.kinematics.n_points() {
             return Bond::Other;
         }
-        let carries = |jump| self.tried(jump).map(|traction| !is_nothing(&traction));
+        let carries = |jump| self.tried(0, jump).map(|traction| !is_nothing(&traction));
         if [[0.0, SLIP], [TRACE, SLIP]].map(carries) == [Some(true), Some(false)] {
             Bond::Bare
         } else {
@@ -112,10 +112,12 @@ impl Group {
         }
     }
 
-    /// Traction of the first point's law without stress after this jump; `None` if it fails.
-    pub(super) fn tried(&self, jump: [f64; 2]) -> Option<[f64; 2]> {
-        let (_, law) = self.pieces(usize::MAX).into_iter().next()?;
-        let state = self.internal.committed.get(..law.n_states())?;
+    /// Traction of a point's law after this jump from no stress, with the point's internal variables; `None` if it fails.
+    pub(super) fn tried(&self, point: usize, jump: [f64; 2]) -> Option<[f64; 2]> {
+        let mut pieces = self.pieces(usize::MAX).into_iter();
+        let (_, law) = pieces.find(|(points, _)| points.contains(&point))?;
+        let n = law.n_states();
+        let state = self.internal.committed.get(point * n..(point + 1) * n)?;
         let (mut flux, mut after) = ([0.0; 2], state.to_vec());
         let rows = Strided::rows(2);
         let start = Start {
