@@ -106,8 +106,7 @@ fn single_corrections_are_told() {
     assert!(phases[0]["single_corrections_from"].is_null());
     assert_eq!(phases[1]["single_corrections_from"], 3);
     let warnings = &finished.observer.warnings;
-    let says =
-        "phase `push`, increment 3: nothing found an equilibrium, as it is where bonds break";
+    let says = "phase `push`, increment 3: nothing else found an equilibrium, as where bonds break";
     assert!(warnings.iter().any(|w| w.contains(says)), "{warnings:?}");
 }
 

@@ -297,7 +297,7 @@ fn viscous_control_leads_where_steps_of_the_load_fail() {
     assert_eq!(viscous_from, [None, Some(1), None]);
     let warnings = &auto.observer.warnings;
     let says =
-        |warning: &&String| warning.contains("`lift`, increment 1: shorter and shorter steps");
+        |warning: &&String| warning.contains("`lift`, increment 1: shorter and shorter load steps");
     assert_eq!(warnings.iter().filter(says).count(), 1, "{warnings:?}");
     // The load with more halvings gets there, too.
     let halved = run(&punch(OWN, "load"));
@@ -331,13 +331,9 @@ fn what_viscous_control_led_to_is_not_said_to_be_relaxed() {
         say("; viscous control found the next equilibrium.") >= 1,
         "{warnings:?}"
     );
-    let often = warnings
-        .iter()
-        .find(|w| w.contains("steps in all"))
-        .unwrap();
     assert!(
-        often.contains("viscous control found the equilibrium of"),
-        "{often}"
+        say(": viscous control found the equilibrium of") >= 1,
+        "{warnings:?}"
     );
 }
 

@@ -47,22 +47,13 @@ impl Built {
 }
 
 /// A page, file or folder of the repository, and the folder that it goes to.
-const FILES: [(&str, &str); 17] = [
+const FILES: [(&str, &str); 15] = [
     ("abi/include/pilum_law.h", "include/pilum"),
     ("abi/include/pilum_point.h", "include/pilum"),
     ("abi/include/pilum_law.hpp", "include/pilum"),
     ("abi/include/pilum_law.f90", "share/pilum"),
     ("abi/include/exports.map", "share/pilum"),
     ("cases", "share/pilum/cases"),
-    // The user material of a case.
-    (
-        "tests/fixtures/umat/hypoplastic.f90",
-        "share/pilum/cases/shear_zone",
-    ),
-    (
-        "tests/fixtures/umat/hypoplasticity.inc",
-        "share/pilum/cases/shear_zone",
-    ),
     ("LICENSE-MIT", "share/doc/pilum"),
     ("LICENSE-APACHE", "share/doc/pilum"),
     ("CHANGELOG.md", "share/doc/pilum"),
