@@ -1,5 +1,6 @@
-//! The last of all test programs, by its name: `cargo test` runs them in the order of their packages' names, then of their
-//! own; documentation's examples come after. It says in one line how many tests were skipped, and for lack of what.
+//! The last of all test programs, by its name: `cargo test` runs them in the order of package names, then of program
+//! names; examples in documentation come after. It prints in one line how many tests were skipped, and for lack of
+//! what.
 #![expect(clippy::print_stdout, reason = "what it is for")]
 
 fn main() {

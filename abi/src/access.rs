@@ -427,7 +427,7 @@ pub fn panic_text(payload: &(dyn Any + Send)) -> &str {
         .unwrap_or("no message")
 }
 
-/// What a point is refused with whose inputs have a [`defect`].
+/// The failure of a point whose inputs have a [`defect`].
 pub const INPUT_NOT_FINITE: Failure = Failure::Numeric("an input is not finite");
 
 /// 0 if all values are finite, else NaN: 0 times a finite number is 0. Two sums at a time and no

@@ -8,8 +8,8 @@ use crate::law::Failure;
 const STEP: f64 = 6e-6;
 
 /// The derivative of an update by its increment, row by row: two evaluations for each component.
-/// `size` is a strain or jump over which the response bends, such as strength over stiffness; where
-/// the response is smooth over 1e-5 of it and the update is good to round-off, the error is about
+/// `size` is a strain or jump over which the response bends, such as strength over stiffness. If
+/// the response is smooth over 1e-5 of it and the update is exact to round-off, the error is about
 /// 1e-10 of the stiffness. At a kink the result lies between those of its sides.
 ///
 /// # Errors

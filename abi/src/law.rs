@@ -179,7 +179,7 @@ pub struct InterfaceRates<'a, S> {
 
 /// A law for solids. Immutable once built; `update` is a pure function of its arguments.
 pub trait ContinuumLaw: Sized + Send + Sync + 'static {
-    /// What the law is called.
+    /// Name and origin of the law.
     const DESCRIPTION: Description;
     /// Hypotheses offered: any of plane strain, axisymmetry, three dimensions, at least one.
     /// Exporting a law with any other list does not compile.
@@ -192,7 +192,7 @@ pub trait ContinuumLaw: Sized + Send + Sync + 'static {
     const SYMMETRIC: bool = false;
     /// The response is linear: one constant tangent, no internal variables.
     const LINEAR: bool = false;
-    /// What it has for a consistent tangent.
+    /// Kind of consistent tangent.
     const TANGENT: HasTangent = HasTangent::Consistent;
     /// Components are in axes of the material: 1 along the layer, 2 normal to it.
     const LOCAL_AXES: bool = false;
@@ -232,13 +232,13 @@ pub trait ContinuumLaw: Sized + Send + Sync + 'static {
 /// A law for interfaces, in two dimensions and perhaps in three. Immutable once built; `update` is a pure function of
 /// its arguments.
 pub trait InterfaceLaw: Sized + Send + Sync + 'static {
-    /// What the law is called.
+    /// Name and origin of the law.
     const DESCRIPTION: Description;
     /// The tangent is symmetric in every state.
     const SYMMETRIC: bool = false;
     /// The response is linear: one constant tangent, no internal variables.
     const LINEAR: bool = false;
-    /// What it has for a consistent tangent.
+    /// Kind of consistent tangent.
     const TANGENT: HasTangent = HasTangent::Consistent;
     /// Offers [`rates`](Self::rates), in two dimensions.
     const RATES: bool = false;

@@ -65,8 +65,8 @@ mod tests {
         assert_eq!(InContact::after_closure(0.25, [-0.25, 2.0]), Err(0.0));
     }
 
-    /// ∂slip/∂`[u_n]` against a central difference of step h = 2⁻¹⁰: slip s (1 + g/u) has the third
-    /// derivative −6 s g/u⁴, so the difference is off by h²/6 times that, |s g| h²/u⁴, and the fifth
+    /// ∂slip/∂`[u_n]` against a central difference of step h = 2⁻¹⁰. Slip s (1 + g/u) has the third
+    /// derivative −6 s g/u⁴, so the difference is off by h²/6 times that, |s g| h²/u⁴. The fifth
     /// derivative adds a part (h/u)² of it.
     #[test]
     fn the_derivative_is_that_of_the_slip() {

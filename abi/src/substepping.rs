@@ -78,10 +78,10 @@ pub struct Attempt<S> {
     pub error: f64,
 }
 
-/// Carries `start` over an increment by steps of its fraction. `attempt` takes a step of a fraction
-/// in (0, 1] and estimates its error, which is taken to grow with the square of the step, as that
-/// of the modified Euler method does: a step above the tolerance is repeated smaller, and the next
-/// one is as large as the error permits. Does not allocate.
+/// Carries `start` over an increment in steps, each a fraction of it. `attempt` takes a step of a
+/// fraction in (0, 1] and estimates its error, assumed to grow with the square of the step as in
+/// the modified Euler method. A step above the tolerance is repeated smaller; the next one is as
+/// large as the error permits. Does not allocate.
 ///
 /// # Errors
 /// [`Failure::CutStep`] with the fraction done, after [`MAX_SUBSTEPS`] attempts; the failure of

@@ -368,8 +368,8 @@ fn exports(library: &Path) -> Outcome<Vec<String>> {
     Ok(names)
 }
 
-/// The program named by the variable, or else `default`; `None`, with a remark, if absent.
-/// Where `PILUM_REQUIRE_ALL` or `CI` is set, a missing compiler is a failure.
+/// The program named by the variable, or else `default`; `None`, with a remark, if absent. If
+/// `PILUM_REQUIRE_ALL` or `CI` is set, a missing compiler is a failure.
 fn compiler(variable: &str, default: &str) -> Option<String> {
     let name = env::var(variable).unwrap_or_else(|_| default.to_owned());
     if Command::new(&name).arg("--version").output().is_ok() {

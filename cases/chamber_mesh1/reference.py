@@ -5,13 +5,13 @@ Problem   De Gennaro & Frank, "Modelisation de l'interaction sol-pieu par la met
           mesh 1, elastic sand, thin layer (t = 2 mm) with the interface law MEPI without softening on the shaft.
           Axisymmetric, small strains, units kN, m, kPa; finite-element stresses tension positive; forces are
           for the whole turn (2 pi).  Phase 1: confinement, one increment, everything elastic (layer = sand).
-          Phase 2: MEPI in the layer with the stress carried over (xi = 0), head free, 5 increments.  What MEPI returns at
-          the strain it starts from is the stress it starts from; the force that this leaves out of balance is taken off
-          in proportion to the phase's course.  Phase 3: head pushed 5 mm in 50 increments; displacements from its start.
+          Phase 2: MEPI in the layer with the stress carried over (xi = 0), head free, 5 increments.  At its
+          initial strain MEPI returns its initial stress; the force that this leaves out of balance is taken off in
+          proportion to the phase's course.  Phase 3: head pushed 5 mm in 50 increments; displacements from its start.
 Source    MEPI: equations (6)-(10), (12)-(17); thin layer: (18)-(19); parameters: Tables III and IV, p_0 = 100 kPa.
 Method    8-node quads, 3x3 Gauss points (--points 2: 2x2), full Newton with the consistent tangent, backtracking
-          line search, start from the last increment (else from the tangent), relative residual 1e-10 over the free
-          equations and one iteration more, increment halved when both starts fail (counted).
+          line search.  It starts from the last increment, else from the tangent, and iterates to a relative residual of
+          1e-10 over the free equations, then once more.  The increment is halved when both starts fail (counted).
           MEPI backward Euler: scan for the first sign change of the scalar equation in d(lambda), then brentq.
           Layer as an isotropic elastic quad (M = K_n t, G = K_t t) with plastic strain in n and nm only.
 Options   --points 2, --p0 1, --increments 50, --no-in-plane (jump = t eps_n, t gamma; in-plane stress frozen),

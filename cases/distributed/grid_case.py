@@ -1,9 +1,9 @@
 """Case files of Pilum for an engine that runs on many ranks: the part of them that it computes, and no more.
 
 A case on a grid (`mesh.columns`, `mesh.rows`), with solids and interfaces without thickness, one phase, supports,
-pressures and prescribed displacements. What else a file asks for is refused by its key, so that nothing is left out
-without a word. Probes, figures, `pile`, `output` and `solver` say what Pilum shows and how it iterates: they are
-passed over. The keys: host/docs/reference/case.md.
+pressures and prescribed displacements. Other keys of a file are refused by name, so that nothing is left out
+silently. Probes, figures, `pile`, `output` and `solver` control what Pilum shows and how it iterates: they are
+ignored. The keys: host/docs/reference/case.md.
 """
 
 from __future__ import annotations
@@ -147,7 +147,7 @@ class _Reader:
         return WrongInput(f"{self.path}: {key}: {message}")
 
     def table(self, value: Any, key: str, known: set[str], needed: set[str] = frozenset()) -> dict[str, Any]:  # type: ignore[assignment]
-        """A table that has none but known keys."""
+        """A table with known keys only."""
         if not isinstance(value, dict):
             raise self.wrong(key, "expected a table")
         for name in value:
@@ -270,7 +270,7 @@ class _Reader:
         return groups.ravel()
 
     def law(self, value: Any, name: str) -> dict[str, Any]:
-        """What `pilum.Law` takes; it checks the keys itself. Paths are relative to the file."""
+        """Arguments of `pilum.Law`, which checks the keys itself. Paths are relative to the file."""
         if not isinstance(value, dict) or "law" not in value:
             raise self.wrong(f"laws.{name}.law", "is missing")
         law = dict(value)

@@ -15,7 +15,7 @@ from time import process_time
 from typing import Any
 
 try:
-    import dolfinx_solver  # noqa: F401  # the wheel wants to be first; installations of other kinds have none
+    import dolfinx_solver  # noqa: F401  # the wheel must be imported first; other installations lack it
 except ModuleNotFoundError:
     pass
 import basix
@@ -67,7 +67,7 @@ class Points:
     def __init__(
         self, law: pilum.Law, owners: np.ndarray, each: int, stress: np.ndarray, at: np.ndarray, dt: float
     ) -> None:
-        """`owners` are the numbers of cells or facets in the case, with `each` so many points; `stress` has a row a
+        """`owners` are the numbers of cells or facets in the case, each with `each` points; `stress` has a row a
         point, `at` its coordinates (m)."""
         self.law, self.owners, self.each, self.at = law, owners, each, np.ascontiguousarray(at)
         self.start = self._calling(law.initial, len(stress), flux=stress)
@@ -115,7 +115,7 @@ class Points:
 
 
 def _rows_of(wanted: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Where numbers stand among others."""
+    """Positions of numbers among others."""
     order = np.argsort(known)
     return order[np.searchsorted(known, wanted, sorter=order)] if len(wanted) else np.zeros(0, dtype=int)
 
@@ -326,7 +326,7 @@ class Body:
         self.held = np.flatnonzero(~np.isnan(self.led))
         self.held_globally = (first + self.held[self.held < owned]).astype(PETSc.IntType)
         self.pressure = self._vector(self.outer)
-        # What is out of balance at the start is carried to equilibrium in proportion to the phase, as in Pilum.
+        # The unbalanced forces at the start are carried to equilibrium in proportion to the phase, as in Pilum.
         self.before = self._inner_forces([flux for flux, _ in self._at_start()])
 
     def _unknowns(self, name: str) -> np.ndarray:
@@ -353,7 +353,7 @@ class Body:
         return b
 
     def _take_stress(self, rows: np.ndarray, flux: np.ndarray, tangents: np.ndarray) -> None:
-        """Of solids, for the forms."""
+        """Stresses and tangents of solids, for the forms."""
         self.stress.x.array.reshape(-1, 4)[rows] = flux
         self.tangent.x.array.reshape(-1, 16)[rows] = tangents.reshape(-1, 16)
 

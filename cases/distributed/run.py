@@ -115,7 +115,7 @@ def main() -> None:
     def warn(message: Warning | str, *_: object) -> None:
         print(f"warning: {message}", file=sys.stderr, flush=True)
 
-    # What laws warn of as they are opened is the same on all ranks; later on each has its own points.
+    # Warnings of laws as they are opened are the same on all ranks; later on each has its own points.
     warnings.showwarning = warn
     warnings.simplefilter("once" if first else "ignore", pilum.PilumWarning)
 
@@ -197,7 +197,7 @@ def main() -> None:
 
 
 def mark_of(case, body) -> str:  # noqa: ANN001
-    """What two runs have to share for the one to go on with the other's state."""
+    """A digest that two runs share if the one can go on with the other's state."""
     digest = hashlib.sha256()
     for array in (case.vertices, case.cells):
         digest.update(array.tobytes())

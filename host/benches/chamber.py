@@ -34,7 +34,7 @@ def toml_parts(parts):
 
 def bonded_case(columns, rows, elastic, increments=INCREMENTS):
     """The bonded pile on a mesh. Plastic: the first increments of the case. Elastic: all of them in
-    one, without stress at its start, since some programs know none."""
+    one, without stress at its start, since some programs cannot have one."""
     x, z = bonded_parts(columns, rows)
     text = f'base = "{CASES}/bonded_pile/case.toml"\n'
     phase = '[[phase]]\nname = "push"\n'
@@ -52,7 +52,7 @@ def bonded_case(columns, rows, elastic, increments=INCREMENTS):
 
 def mepi_case(k, increments):
     """Mesh 1 with every element divided by k in both directions, the interface along its length
-    only, loaded in so many increments."""
+    only, loaded in this number of increments."""
     def finer(parts):
         return toml_parts([(k * n, to, ratio ** (1 / k)) for n, to, ratio in parts])
 
@@ -67,8 +67,8 @@ def mepi_case(k, increments):
 class Mesh:
     """The bonded pile as nodes and 8-node elements, as other programs want them.
 
-    `nodes`: coordinates; `elements`: corners counter-clockwise from the lower left, then the middles
-    of the sides below, right, above, left; `in_pile` of every element; `lines`: of every name the
+    `nodes`: coordinates. `elements`: corners counter-clockwise from the lower left, then the middles
+    of the sides below, right, above, left. `in_pile` of every element. `lines`: for every name the
     edges (end, end, middle), left to right or upwards, and their elements.
     """
 

@@ -4,8 +4,8 @@
     ground.py PART … [--rounds N]
 
 bored_pile  cases/bored_pile on 1 917 quads instead of 748, the head pushed down by 0.1 m: in 10 increments by
-            control = "viscous", in 40 with the tolerances of the case and with coarser ones; goal: 4 CPU s
-at_rest     the first phase alone of the same ground, 20 000 quads; goal: one factorisation, 2 CPU s
+            control = "viscous", in 40 with the tolerances of the case and with coarser ones. Goal: 4 CPU s.
+at_rest     the first phase alone of the same ground, 20 000 quads. Goal: one factorisation, 2 CPU s.
 
 Exit code 1 if a goal is missed.
 """

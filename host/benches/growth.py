@@ -4,10 +4,10 @@
     growth.py PART … [--sizes N,…] [--increments N] [--rounds N]
 
 mepi     elastic sand and the interface law MEPI: cases/chamber_mesh1, every element divided by the
-         sizes in both directions (the interface along its length only), 10 increments instead of 50
+         sizes in both directions (the interface along its length only), 10 increments instead of 50.
 plastic  cases/bonded_pile on as many columns as the sizes say and twice as many rows, its first 4 of
-         10 increments
-threads  wall seconds on one and two threads: `mepi` and `plastic`, one size each
+         10 increments.
+threads  wall seconds on one and two threads: `mepi` and `plastic`, one size each.
 
 Exponents are slopes of straight lines through the last three sizes, both axes logarithmic.
 """
@@ -38,7 +38,7 @@ def plastic_run(program, size, increments, n_threads=1):
 
 
 def slope(x, y):
-    """Of log y against log x, least squares over the last three."""
+    """Slope of log y against log x, least squares over the last three."""
     x, y = ([log(value) for value in values[-3:]] for values in (x, y))
     a, b = statistics.mean(x), statistics.mean(y)
     return sum((u - a) * (v - b) for u, v in zip(x, y)) / sum((u - a) ** 2 for u in x)

@@ -1,19 +1,19 @@
 #!/usr/bin/env python3
-"""Measures laws and whole runs beside those of a peer, in one run, on one thread, in CPU time, and
+"""Compares laws and whole runs with those of a peer, in one run, on one thread, in CPU time, and
 prints the ratios.
 
     peers.py [PART …] [--rounds N] [--ogs FOLDER] [--meshes NAME,…] [--failing]
 
-Each part is a function in PARTS that prints its own table; a part whose peer is not there says what
-is missing and how to get it, and the others still run.
+Each part is a function in PARTS that prints its own table; a part whose peer is missing prints
+what is missing and how to get it, and the others still run.
 
 laws    Mohr-Coulomb and elasticity of MFront, from the Python wheel of OpenGeoSys
-        (`python3 -m venv FOLDER && FOLDER/bin/pip install ogs==6.5.9`; FOLDER by --ogs or PILUM_OGS)
-linked  the peer is the law itself, linked into the calling program instead of opened as a plugin
+        (`python3 -m venv FOLDER && FOLDER/bin/pip install ogs==6.5.9`; FOLDER by --ogs or PILUM_OGS).
+linked  the peer is the law itself, linked into the calling program instead of opened as a plugin.
 generic a law called point by point through MFront's generic interface, as OpenGeoSys and MGIS do; the peer
-        is the same library, called by the contract
-elastic the elastic pile in a chamber beside CalculiX (`ccx` on the path, Debian: calculix-ccx)
-plastic the pile in Mohr-Coulomb soil, cases/bonded_pile, beside OpenGeoSys (as above)
+        is the same library, called by the contract.
+elastic the elastic pile in a chamber, against CalculiX (`ccx` on the path, Debian: calculix-ccx).
+plastic the pile in Mohr-Coulomb soil, cases/bonded_pile, against OpenGeoSys (as above).
 """
 
 import argparse
@@ -118,7 +118,7 @@ def linked(options):
     built = target()
     manifest = ("--manifest-path", ROOT / "models" / law / "Cargo.toml")
     run(cargo, "build", "--release", "--quiet", *manifest)
-    # Built aside, since a crate type of its own would replace the shared library.
+    # Built aside, since another crate type would replace the shared library.
     aside = built / "linked"
     run(cargo, "rustc", "--release", "--quiet", "--crate-type", "staticlib", "--target-dir", aside, *manifest)
     with tempfile.TemporaryDirectory() as folder:

@@ -1,7 +1,7 @@
 """Programs: where they are, and the CPU seconds, wall seconds and peak memory of one run.
 
 A child's peak memory counts from the fork, when it still is its parent. So this module is also that
-parent: a program of its own, smaller than anything it measures.
+parent: a separate program, smaller than anything it measures.
 
     programs.py RESULT LOG PROGRAM [ARGUMENT …]
 """
@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 
 
 class Missing(Exception):
-    """What a measurement needs and does not find."""
+    """A measurement needs something that is missing."""
 
 
 class Failed(Exception):

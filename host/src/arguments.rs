@@ -1,7 +1,7 @@
 //! The command line.
 
 use clap::{Parser, Subcommand, ValueEnum};
-use law::vetting;
+use law::trial;
 use std::path::PathBuf;
 use workshop::new_law::NewLaw;
 
@@ -246,7 +246,7 @@ pub(crate) enum Command {
         into: Option<PathBuf>,
     },
     /// Try a library: what a child process does.
-    #[command(name = vetting::COMMAND, hide = true)]
+    #[command(name = trial::COMMAND, hide = true)]
     ProbeLibrary { library: PathBuf, sha256: String },
     /// Call a law for another process.
     #[command(name = "law-worker", hide = true)]

@@ -4,14 +4,14 @@ mod cases;
 mod studies;
 
 use crate::arguments::{Arguments, Command, File};
-use crate::say::{print, printing, say};
+use crate::output::{print, printing, say};
 use crate::threads;
 use cases::{dry_run_cases, run_cases, write_report};
 use clap::CommandFactory;
 use input::schema::{self, FileKind};
 use input::{Case, Error};
 use law::adapter::Adapter;
-use law::{Opener, SearchPath, Stop, vetting};
+use law::{Opener, SearchPath, Stop, trial};
 use runs::run::Options;
 use runs::{calibration, supervision, trade_off};
 use std::path::{Path, PathBuf};
@@ -207,7 +207,7 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
         Command::LawWorker => Ok(law::isolate::work()?),
         #[cfg(not(unix))]
         Command::LawWorker => Err(Error::usage("there are no workers here")),
-        Command::ProbeLibrary { library, sha256 } => Ok(vetting::probe(
+        Command::ProbeLibrary { library, sha256 } => Ok(trial::probe(
             &library,
             &sha256,
             &mut std::io::stdout().lock(),

@@ -2,17 +2,17 @@
 
 mod arguments;
 mod commands;
+mod output;
 mod progress;
-mod say;
 mod threads;
 
 use arguments::Arguments;
 use clap::Parser;
 use input::Error;
 use law::{Opener, Trust};
+use output::Output;
 use results::report;
 use runs::supervision;
-use say::Output;
 use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
@@ -50,7 +50,7 @@ fn main() -> ExitCode {
         .or_else(|| arguments.command.isolates_anyway());
     // The limits of a check's own process are not a law's doing.
     if arguments.command.calls_laws().is_some() {
-        law::custody::begin();
+        law::process_state::begin();
     }
     supervision::begin_run(apart.is_some());
     let trust = Trust {
@@ -89,14 +89,14 @@ fn watched(again: bool) -> Option<ExitCode> {
             // Its runs have no reports of their own, or write them the next time.
             Ok(true) => return,
             Ok(false) => {}
-            Err(why) => say::error(&why),
+            Err(why) => output::error(&why),
         }
         let reported = || {
             let folders = [folder.to_owned()];
             report::write(&folders, &report::default_path(&folders)).map(|_| ())
         };
         if let Err(why) = mended.and_then(|is_there| if is_there { reported() } else { Ok(()) }) {
-            say::error(&why.into());
+            output::error(&why.into());
         }
     };
     Some(match supervision::supervise(again, &mend)? {
@@ -108,12 +108,12 @@ fn watched(again: bool) -> Option<ExitCode> {
 /// The exit code, after the message. The outcome of a command matters more than an incomplete
 /// message.
 fn ended(outcome: Result<(), Error>) -> ExitCode {
-    let outcome = outcome.and(say::what_was_not_said().map_or(Ok(()), Err));
+    let outcome = outcome.and(output::what_was_not_said().map_or(Ok(()), Err));
     let code = match outcome.map_err(named_shortage) {
         Ok(()) => 0,
         Err(error) => {
             let code = error.exit_code();
-            say::error(&error);
+            output::error(&error);
             code
         }
     };

@@ -1,6 +1,6 @@
 //! How a run goes, for whoever waits for it.
 
-use crate::say::say;
+use crate::output::say;
 use indicatif::{ProgressBar, ProgressStyle};
 use law::Stop;
 use mechanics::Place;

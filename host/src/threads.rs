@@ -21,8 +21,8 @@ static WAITING: Mutex<Vec<ThreadBuilder>> = Mutex::new(Vec::new());
 /// Since when.
 static SINCE: OnceLock<Instant> = OnceLock::new();
 
-/// Has this many threads, or all processors, wait until they are told to [`begin`]. Until then the
-/// one that calls this does everything alone.
+/// Starts this many threads, or one for each processor; they wait for [`begin`]. Until then the
+/// calling thread does everything alone.
 pub(crate) fn gather(n: Option<u16>) -> Result<(), Error> {
     SINCE.get_or_init(Instant::now);
     let threads = ThreadPoolBuilder::new()

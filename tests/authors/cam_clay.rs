@@ -1,10 +1,10 @@
 //! Modified Cam-clay of `models/foreign`, in C++ and in Fortran, by what their helpers offer.
 //!
 //! Goal        a law with an initial state, a choice, optional parameters and a tangent by
-//!             differences can be written in either language, and answers as closed forms say
-//! Set-up      random paths in three dimensions; isotropic compression; shear at constant volume
+//!             differences can be written in either language, and answers as closed forms say.
+//! Set-up      random paths in three dimensions; isotropic compression; shear at constant volume.
 //! Asserts     both languages alike to round-off; normal compression line, critical state,
-//!             undrained strength, elastic shear; `pilum check` passes
+//!             undrained strength, elastic shear; `pilum check` passes.
 
 use crate::compilers::{library, repository};
 use crate::program::pilum;

@@ -1,8 +1,8 @@
 //! One law in four languages: `coulomb_joint` in Rust and in `models/foreign`.
 //!
-//! Goal        laws in C, C++ and Fortran give what the law in Rust gives, tangents included
-//! Set-up      random parameters and paths, through the point driver and call by call
-//! Asserts     every column of every row, and every tangent, to round-off
+//! Goal        laws in C, C++ and Fortran give what the law in Rust gives, tangents included.
+//! Set-up      random parameters and paths, through the point driver and call by call.
+//! Asserts     every column of every row, and every tangent, to round-off.
 
 use crate::compilers::{library, repository};
 use crate::guides::commands;

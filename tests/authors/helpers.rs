@@ -1,6 +1,6 @@
-//! What the helpers for C, C++ and Fortran offer next to one law with internal variables: several laws
-//! in a library, laws without parameters or internal variables, choices, optional parameters,
-//! initial values, and what happens with more internal variables than they have room for.
+//! Helpers for C, C++ and Fortran, beyond one law with internal variables: several laws in a library,
+//! laws without parameters or internal variables, choices, optional parameters, initial values. Also
+//! more internal variables than they have room for.
 
 use crate::compilers::{library, repository};
 use crate::program::pilum;
@@ -54,7 +54,7 @@ fn a_library_holds_several_laws() {
     }
 }
 
-/// In C++ the initial state is told the number of components; a class that was written without it compiles as well.
+/// In C++ the initial state receives the number of components; a class written without it compiles as well.
 #[test]
 fn an_initial_state_in_cpp_knows_its_components() {
     let source = repository("tests/authors/counted.cpp");

@@ -1,7 +1,7 @@
-//! From an idea to a finite-element run, in any language: `pilum new-law` with the commands of the
-//! README that it writes, one law in four languages, what `pilum laws` says, the schemas of input
-//! files, and the pages of `host/docs`, which are followed and compared. What needs a compiler that is missing is passed over with a
-//! remark, or fails where nothing may be passed over (`tests::needs`). What CI leaves out is listed.
+//! From an idea to a finite-element run, in any language: `pilum new-law` with the commands of the README that it
+//! writes, and one law in four languages. Also the output of `pilum laws`, the schemas of input files, and the pages of
+//! `host/docs`, which are followed and compared. Tests that need a missing compiler are skipped with a remark, or fail
+//! where nothing may be skipped (`tests::needs`). Tests that CI leaves out are listed.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests panic to fail")]
 
 mod cam_clay;

@@ -11,9 +11,9 @@
 //!   shown. A command ends with exit code 0, or with the one that `$ echo $?` shows next.
 //! - A `text` block is neither run nor compared.
 //!
-//! Remarks at the top of a page: `<!-- needs: gfortran -->`, it is passed over where that program is
-//! missing; `<!-- files of: how-to/slice.md -->`, the files of that page are there from the start;
-//! `<!-- has: tutorial/my_pile.msh -->`, so is this file of the cases.
+//! Remarks at the top of a page: `<!-- needs: gfortran -->` skips it if that program is missing.
+//! With `<!-- files of: how-to/slice.md -->` the files of that page exist from the start; with `<!--
+//! has: tutorial/my_pile.msh -->` this file of the cases does.
 //!
 //! A picture `![…](…/RUN/NAME.svg)` is `results/RUN/NAME.svg` at the end of the page; `PILUM_BLESS=1` rewrites it.
 

@@ -1,9 +1,9 @@
 //! Sensitivities of a law to its parameters, along a path.
 //!
 //! Goal        rates that a law gives through dual numbers, carried from increment to increment,
-//!             are the derivatives of what it ends with, by every parameter and the initial stress
-//! Set-up      `fixtures/sensitive_joint`, compressed, sheared to and fro into slip, with dilatancy
-//! Asserts     within 1e-7 of central differences of whole paths; the flag; `pilum check`
+//!             are the derivatives of what it ends with, by every parameter and the initial stress.
+//! Set-up      `fixtures/sensitive_joint`, compressed, sheared to and fro into slip, with dilatancy.
+//! Asserts     within 1e-7 of central differences of whole paths; the flag; `pilum check`.
 
 use crate::program::pilum;
 use abi::Hypothesis;

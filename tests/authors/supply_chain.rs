@@ -156,8 +156,8 @@ fn licences_and_sources_are_those_of_deny_toml() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// What `cargo package` takes: the crates have names of ours, all that a registry asks for, and no part outside
-/// their folder.
+/// Requirements of `cargo package`: the crates have names of ours, all that a registry asks for, and no part
+/// outside their folder.
 #[test]
 fn crates_can_be_packaged() {
     let output = Command::new(env!("CARGO"))

@@ -1,12 +1,12 @@
 //! Laws without a consistent tangent, and with one by differences.
 //!
-//! Goal        a law may say that its tangent is approximate, or that it has none, and is solved all
-//!             the same; differences are as good as the derivative
+//! Goal        a law may declare its tangent approximate or missing, and is solved all the same;
+//!             differences are as good as the derivative.
 //! Set-up      the joint of `models/foreign` in C, with what it writes as its tangent changed
 //!             (derivative, differences, elastic operator, none), between two blocks, pressed and pushed
-//!             into slip with dilatancy
-//! Asserts     the same shear traction to the tolerance of the solver in at most half as many iterations
-//!             again as with the derivative; what is reported of what a law declares; `pilum check` passes
+//!             into slip with dilatancy.
+//! Asserts     the same shear traction to the tolerance of the solver in at most 1.5 times the iterations
+//!             with the derivative; reports on what a law declares; `pilum check` passes.
 
 use crate::compilers::{library, repository};
 use crate::program::pilum;

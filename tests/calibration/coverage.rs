@@ -1,8 +1,8 @@
 //! Intervals hold the true value as often as they say.
 //!
-//! Curves are computed by the law itself and scattered by normal noise of a known size, 200 times. Of
-//! 200 intervals of 95 % this many hold the truth as the binomial distribution lets; its bounds leave out
-//! one repetition of the test in a thousand on either side.
+//! Curves are computed by the law itself and scattered by normal noise of a known size, 200 times. The
+//! number of 95 % intervals that hold the truth, out of 200, lies within bounds of the binomial
+//! distribution. These leave out one repetition of the test in a thousand on either side.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use crate::{computed, holds, run, write_points};

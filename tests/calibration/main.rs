@@ -1,9 +1,9 @@
 //! `pilum calibrate`: what it finds of parameters that are known.
 //!
-//! Goal        values and intervals from tests whose truth is known; words where tests do not tell
-//! Set-up      drivers of interface laws with synthetic scatter; the calibrations in `cases/`
-//! Asserts     true values inside the intervals at the nominal rate; derivatives by a law's rates; standard errors of closed
-//!             forms; no interval where nothing is determined; systematic errors said aloud, honest noise not
+//! Goal        values and intervals from tests whose truth is known; a report where tests do not tell.
+//! Set-up      drivers of interface laws with synthetic scatter; the calibrations in `cases/`.
+//! Asserts     true values inside the intervals at the nominal rate; derivatives by a law's rates; standard errors of
+//!             closed forms; no interval where nothing is determined; systematic errors reported, honest noise not.
 #![allow(
     clippy::unwrap_used,
     clippy::format_push_string,

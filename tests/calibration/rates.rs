@@ -95,8 +95,8 @@ fn rates_of_a_law_are_the_derivatives_of_its_curves() {
     println!("largest error {worst:.1e}");
 }
 
-/// A parameter is fitted or said to be unseen, however much more the curves answer to another one: counted in widths of a
-/// range that is far too wide, cohesion moves them by 10⁵ times what the stiffness does.
+/// A parameter is fitted or reported as unseen, however much more the curves respond to another one. Counted in widths
+/// of a range that is far too wide, cohesion moves them 10⁵ times as much as the stiffness.
 #[test]
 fn a_column_beside_a_much_larger_one_is_fitted() {
     let place = TempDir::new().unwrap();

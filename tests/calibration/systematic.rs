@@ -28,7 +28,7 @@ fn slips() -> Vec<f64> {
     (1..=39).map(|k| 3e-3 * f64::from(k) / 39.0).collect()
 }
 
-/// What is measured of the truth with this much slack, noise of 0.8 kPa on it.
+/// Measured points: the true curve with this much slack and noise of 0.8 kPa.
 fn measured(slack: f64, noise: &mut Noise) -> Vec<(f64, f64)> {
     let moved: Vec<f64> = slips().iter().map(|x| (x - slack).max(0.0)).collect();
     let y = computed(&joint(TRUTH[0], TRUTH[1]), ["jump_t", "traction_t"], &moved);
@@ -154,8 +154,8 @@ fn scales_and_offsets_of_both_axes_are_found() {
     assert!((line[0].1 - found).abs() < 1e-9, "{:?} {found}", line[0]);
 }
 
-/// Of calibrations with honest noise one in a hundred may be warned of each kind. 300 with the noise given, 300 without;
-/// the law of noise is normal. The bound leaves out one repetition of this test in a thousand.
+/// At most one calibration with honest noise in a hundred gets each kind of warning. There are 300 with the noise given
+/// and 300 without; the noise is normal. The bound leaves out one repetition of this test in a thousand.
 #[test]
 fn honest_noise_is_warned_of_no_more_often_than_said() {
     const REPETITIONS: usize = 300;

@@ -1,9 +1,9 @@
 //! One interface element of varying aspect ratio: De Gennaro & Frank, Fig. 5, Table II.
 //!
-//! Goal      the curves of the paper without its oscillation, and where its shortcomings come from
-//! Geometry, boundary, law: cases/aspect_ratio/README.md
+//! Goal      the curves of the paper without its oscillation, and where its shortcomings come from.
+//! Geometry, boundary, law: cases/aspect_ratio/README.md.
 //! Asserts   ultimate shear stress, monotony, plateaus; the zero-thickness element against a closed
-//!           form; the layer with mean strains against the law at one point; the causes one by one
+//!           form; the layer with mean strains against the law at one point; the causes one by one.
 
 use input::case::CaseFile;
 use input::{Case, Driver};

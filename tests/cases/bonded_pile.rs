@@ -1,9 +1,9 @@
 //! A bonded elastic pile pushed into confined Mohr–Coulomb soil.
 //!
-//! Goal      the head load that other programs find, in no more iterations
-//! Geometry, boundary, laws: cases/bonded_pile/README.md
+//! Goal      the head load that other programs find, in no more iterations.
+//! Geometry, boundary, laws: cases/bonded_pile/README.md.
 //! Asserts   elastic head load to 8 digits; plastic one within the rounding of the others' surface;
-//!           Newton iterations; no cut-back
+//!           Newton iterations; no cut-back.
 
 use crate::variant::{assert_close, finished};
 use std::f64::consts::PI;

@@ -1,8 +1,8 @@
 //! Pile in a calibration chamber: De Gennaro & Frank, mesh 1, three interface models.
 //!
-//! Goal      the main job end to end
-//! Geometry, boundary, laws: cases/chamber_mesh1/README.md
-//! Asserts   equality with an independent program; K_l after confinement; friction; equilibrium
+//! Goal      the main job end to end.
+//! Geometry, boundary, laws: cases/chamber_mesh1/README.md.
+//! Asserts   equality with an independent program; K_l after confinement; friction; equilibrium.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,9 +1,9 @@
 //! De Gennaro & Frank, Fig. 8: the chamber under its confinement of 100 kPa.
 //!
-//! Goal      radial stress on the shaft, influence of the sand's law and of the end plates
-//! Geometry, boundary, laws: cases/chamber_confinement/README.md
+//! Goal      radial stress on the shaft, influence of the sand's law and of the end plates.
+//! Geometry, boundary, laws: cases/chamber_confinement/README.md.
 //! Asserts   `K_l` against closed forms; sand that hardly yields; radial stress falling towards rough
-//!           plates; end plates that hardly matter at half height and during loading
+//!           plates; end plates that hardly matter at half height and during loading.
 
 use crate::variant::{Point, assert_close, finished};
 

@@ -1,9 +1,9 @@
 //! The chamber with a toe halved sixteen times, and with increments fifty times too large.
 //!
-//! Goal      no silent wrong number at the extremes
-//! Geometry, boundary, laws: cases/chamber_extremes/README.md
+//! Goal      no silent wrong number at the extremes.
+//! Geometry, boundary, laws: cases/chamber_extremes/README.md.
 //! Asserts   runs end well, loads that do not depend on the toe's elements, what large increments
-//!           cost, warnings of round-off
+//!           cost, warnings of round-off.
 
 use crate::variant::{Run, finished};
 use std::sync::Arc;

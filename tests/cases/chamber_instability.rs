@@ -1,10 +1,10 @@
 //! De Gennaro & Frank, Table IV with p_0 = 1 kPa: an interface that contracts, near the head out of contact.
 //!
 //! Goal      a law that cannot carry the stress it finds is swapped in at once; where its answer to the relative
-//!           displacements jumps, the run stops at the last equilibrium and reports it
-//! Geometry, boundary, laws: cases/chamber_instability/README.md
-//! Asserts   all variants with p_0 = 1 kPa end without cut-back or relaxation, and what they give; with C_0 = 1, one swap
-//!           and two end alike; with k_n × 1000, exit code 2 and the limit that K_n exceeds
+//!           displacements jumps, the run stops at the last equilibrium and reports it.
+//! Geometry, boundary, laws: cases/chamber_instability/README.md.
+//! Asserts   all variants with p_0 = 1 kPa end without cut-back or relaxation, and what they give; with C_0 = 1, one
+//!           swap and two end alike; with k_n × 1000, exit code 2 and the limit that K_n exceeds.
 
 use crate::variant::{assert_close, finished, run};
 

@@ -1,9 +1,9 @@
 //! De Gennaro & Frank, Fig. 13: three models of the interface in elastic sand.
 //!
-//! Goal      the four findings of the paper about the models
-//! Geometry, boundary, laws: cases/chamber_interface_model/README.md
+//! Goal      the four findings of the paper about the models.
+//! Geometry, boundary, laws: cases/chamber_interface_model/README.md.
 //! Asserts   same ultimate friction without dilation, `MEPI` lowest and most gradual; small, limited
-//!           and excessive growth with it
+//!           and excessive growth with it.
 
 use crate::variant::{Run, assert_close, finished};
 use tests::tolerance::EQUILIBRIUM;

@@ -1,9 +1,9 @@
 //! De Gennaro & Frank, Figs 9 to 11: the pile is pushed into elastic sand.
 //!
-//! Goal      mobilisation, distributions along the shaft, lateral pressure, displacements
-//! Geometry, boundary, laws: cases/chamber_loading/README.md
+//! Goal      mobilisation, distributions along the shaft, lateral pressure, displacements.
+//! Geometry, boundary, laws: cases/chamber_loading/README.md.
 //! Asserts   order and shape of the curves; `K_l` at the end; balance of loads; uniform friction on
-//!           the shaft, concentration at the toe; displacements that concentrate at the pile
+//!           the shaft, concentration at the toe; displacements that concentrate at the pile.
 
 use crate::variant::{Run, assert_close, finished};
 use std::f64::consts::PI;

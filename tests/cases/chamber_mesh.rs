@@ -1,9 +1,9 @@
 //! De Gennaro & Frank, Fig. 14: the chamber on other meshes.
 //!
-//! Goal      independence of the mesh, away from head and toe
-//! Geometry, boundary, laws: cases/chamber_mesh/README.md
+//! Goal      independence of the mesh, away from head and toe.
+//! Geometry, boundary, laws: cases/chamber_mesh/README.md.
 //! Asserts   nodes of mesh 2; agreement of meshes 1 and 2; convergence under refinement; a soft
-//!           element that relieves the toe
+//!           element that relieves the toe.
 
 use crate::variant::finished;
 

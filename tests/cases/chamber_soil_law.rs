@@ -1,8 +1,8 @@
 //! De Gennaro & Frank, Fig. 12: Mohr–Coulomb sand without cohesion around the pile.
 //!
-//! Goal      a rigid toe in sand with c = 0 converges to an equilibrium that holds
-//! Geometry, boundary, laws: cases/chamber_soil_law/README.md
-//! Asserts   balance of loads; every stress admissible; `K_l` keeps rising; toe load far below elastic
+//! Goal      a rigid toe in sand with c = 0 converges to an equilibrium that holds.
+//! Geometry, boundary, laws: cases/chamber_soil_law/README.md.
+//! Asserts   balance of loads; every stress admissible; `K_l` keeps rising; toe load far below elastic.
 
 use crate::variant::{assert_close, finished};
 use std::f64::consts::PI;

@@ -1,8 +1,8 @@
 //! Piles and footings in real ground: bored, textbook, pulled, cycled and pushed-in piles; circular footings.
 //!
-//! Goal      what an engineer reads off: settlements, shares, bearing capacity factors
-//! Geometry, boundary, laws: the READMEs of the cases
-//! Asserts   two meshes against each other; hand calculations; factors of the literature
+//! Goal      what an engineer reads off: settlements, shares, bearing capacity factors.
+//! Geometry, boundary, laws: the READMEs of the cases.
+//! Asserts   two meshes against each other; hand calculations; factors of the literature.
 
 use crate::variant::{Run, finished};
 use std::f64::consts::PI;
@@ -81,8 +81,8 @@ fn pushed(control: &str, increments: u32) -> (usize, f64) {
     (run.cut_backs, *load.last().unwrap())
 }
 
-/// Where joints slide and ground yields all around, the tangent of an iterate is singular though the step has an
-/// equilibrium: under viscous control it is left behind without a cut-back, in ten increments for the same load.
+/// If joints slide and ground yields all around, the tangent of an iterate is singular though the step has an
+/// equilibrium. Viscous control passes it without a cut-back, in ten increments for the same load.
 #[test]
 fn viscous_control_leaves_singular_tangents_behind() {
     let (_, by_load) = pushed("load", 10);

@@ -1,9 +1,9 @@
 //! Laws for joints: alone, and in the joint of `cases/chamber_joint`, swapped in by one line.
 //!
-//! Goal      each follows its closed form on the path that it is for, and carries the pile to its end
-//! Geometry, boundary: cases/joint_laws/README.md, cases/chamber_joint/README.md
+//! Goal      each follows its closed form on the path that it is for, and carries the pile to its end.
+//! Geometry, boundary: cases/joint_laws/README.md, cases/chamber_joint/README.md.
 //! Asserts   closed forms at the turns of each path; balance of the loads on the chamber and on the
-//!           pile, what is known of the shaft at the end
+//!           pile, what is known of the shaft at the end.
 
 use runs::point::run_file_variants;
 use std::f64::consts::PI;
@@ -208,8 +208,8 @@ fn the_load_transfer_curve_reaches_its_limit() {
     assert!((tau / 80.0 - 1.0).abs() < EQUILIBRIUM, "{tau}");
 }
 
-/// A rigid pile of 10 m in ground that is held: the head load is what the curves of shaft and base have at
-/// the settlement, πD L τ + πD²/4 q, going down, and by Masing's rule and the first slope coming up.
+/// A rigid pile of 10 m in fixed ground. Going down, the head load is that of the curves of shaft and base
+/// at the settlement, πD L τ + πD²/4 q. Coming up, it follows Masing's rule and the first slope.
 #[test]
 fn a_rigid_pile_carries_what_its_load_transfer_curves_have() {
     let text = r#"

@@ -1,9 +1,9 @@
 //! Interface shear box: De Gennaro & Frank, Figs 3 and 4, Table I.
 //!
-//! Goal      MEPI alone follows what the paper's text and table say of the tests on both sands
-//! Geometry, boundary, law: cases/shear_box/README.md
+//! Goal      MEPI alone follows the paper's text and table on the tests on both sands.
+//! Geometry, boundary, law: cases/shear_box/README.md.
 //! Asserts   friction against equations (10), (11); contraction; ultimate and residual friction;
-//!           order of curves; normal stress against the stiffness that holds it; figures
+//!           order of curves; normal stress against the stiffness that holds it; figures.
 
 use input::Error;
 use runs::point::run_file_variants;
@@ -126,8 +126,8 @@ impl Sand {
     /// The most that the sand can dilate under constant normal stress, in increments up to `step` of slip.
     /// Beyond the slip ξ_c of the characteristic state it dilates by (μ − μ_c0)/cosh z per slip, equations
     /// (16), (17), z = C ξ. As (10) is concave, that is at most f(x) = 2 μ'(ξ_c) x exp(−C (ξ_c + x)) at
-    /// ξ_c + x. f rises to its maximum at 1/C and falls, so that the sum of its end-of-increment values
-    /// exceeds its integral by one increment of the maximum at most.
+    /// ξ_c + x. This bound f rises to its maximum at 1/C and falls, so that the sum of its
+    /// end-of-increment values exceeds its integral by one increment of the maximum at most.
     fn most_dilation(&self, step: f64) -> f64 {
         let scale = self.a * self.sigma_ni * self.t;
         let characteristic = scale * self.mu_c0 / (self.mu_p - self.mu_c0);

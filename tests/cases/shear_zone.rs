@@ -1,9 +1,9 @@
 //! Laws of solids in a shear zone of an interface.
 //!
-//! Goal      any law of solids is a law of interfaces, with the answers that simple shear has
-//! Geometry, boundary, law: cases/shear_zone/README.md
+//! Goal      any law of solids is a law of interfaces, with the answers that simple shear has.
+//! Geometry, boundary, law: cases/shear_zone/README.md.
 //! Asserts   elastic stage τ = G u_t/d up to the yield that the lateral stress gives; limits of
-//!           Mohr–Coulomb in simple shear; the oriented criterion; critical state of hypoplasticity
+//!           Mohr–Coulomb in simple shear; the oriented criterion; critical state of hypoplasticity.
 
 use runs::point::run_file_variants;
 use std::path::{Path, PathBuf};
@@ -123,15 +123,15 @@ fn hypoplastic() -> Option<TempDir> {
     compiler
         .args(["-O2", "-shared", "-fPIC", "-o"])
         .arg(folder.path().join("libhypoplastic.so"))
-        .arg(repository("tests/fixtures/umat/hypoplastic.f90"));
+        .arg(repository("cases/shear_zone/hypoplastic.f90"));
     let output = tests::needs::output(&mut compiler)?;
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");
-    let sidecar = std::fs::canonicalize(repository("tests/fixtures/umat/hypoplastic.law.toml"));
+    let sidecar = std::fs::canonicalize(repository("cases/shear_zone/hypoplastic.law.toml"));
     let driver = repository("cases/shear_zone/hypoplastic.toml");
     let text = std::fs::read_to_string(driver).unwrap();
     let text = text.replacen(
-        "../../tests/fixtures/umat/hypoplastic.law.toml",
+        "hypoplastic.law.toml",
         sidecar.unwrap().to_str().unwrap(),
         1,
     );

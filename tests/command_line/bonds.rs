@@ -1,5 +1,6 @@
-//! Bonds without normal stress that break at the first tension, along the shaft of a pile: an equilibrium is found, with the
-//! same head load whatever the increments; where absent the end of the run names what gives way, and what helps.
+//! Bonds without normal stress that break at the first tension, along the shaft of a pile. An equilibrium is found,
+//! with the same head load whatever the increments. Without an equilibrium the end of the run names what gives way, and
+//! what helps.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use crate::program::{DONE, NO_EQUILIBRIUM, Place};

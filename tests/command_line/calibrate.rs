@@ -52,8 +52,8 @@ fn place() -> Place {
     place
 }
 
-/// The same points with a slack of 0.3 mm: the warning comes before all notes, in the text, the page and the files, and
-/// names the points; an offset that is looked for has an interval, in the text and in the table.
+/// The same points with a slack of 0.3 mm. The warning precedes all notes, in the text, the page and the files, and
+/// names the points. A fitted offset has an interval, in the text and in the table.
 #[test]
 fn slack_is_warned_of_everywhere_and_an_offset_is_a_row() {
     let place = place();

@@ -249,7 +249,7 @@ fn close(found: &[f64], expected: &[f64]) {
     both.for_each(|(a, b)| assert!((a - b).abs() < 1e-9 * most, "{found:?} {expected:?}"));
 }
 
-/// A load whose ground goes and comes back is told of where it comes back, unless it was set to 0 meanwhile.
+/// A load that comes back with its ground is reported where it does, unless it was set to 0 meanwhile.
 #[test]
 fn a_load_comes_back_with_its_ground_and_is_told_of() {
     const DIG: (&str, &str) = ("dig", "deactivate = [\"upper\"]");
@@ -340,7 +340,7 @@ fn a_pressure_that_ground_covers_ends_and_comes_back() {
     }
 }
 
-/// What an earlier phase pushed by `displacement` is not released by a force, and not pushed by one.
+/// A force neither releases nor pushes a line that an earlier phase pushed by `displacement`.
 #[test]
 fn loads_on_what_a_displacement_holds_are_refused_with_free_as_the_hint() {
     let push = ("push", "displacement = [{ line = \"top\", y = -1e-3 }]");
@@ -467,7 +467,7 @@ fn loads_and_displacements_on_an_interface_are_refused() {
     run(&with_phases(&jointed(false), &[force, off]), "s_low");
 }
 
-/// Tables below the mesh are those of a dry site; those above the ground are told of, with both heights and the line.
+/// A water table below the mesh makes a dry site. One above the ground is reported, with both heights and the line.
 #[test]
 fn water_below_the_mesh_and_above_the_ground_is_said() {
     let heavy = COLUMN.replace(

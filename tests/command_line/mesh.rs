@@ -402,7 +402,8 @@ fn two_blocks(mesh: &str) -> String {
     )
 }
 
-/// A mesh from a file gives what the same grid gives; names that the case does not use are told once.
+/// A mesh from a file gives the same results as that grid; names that the case does not use are
+/// reported once.
 #[test]
 fn a_mesh_from_a_file_is_that_of_the_grid() {
     const GRID: &str = "mesh.columns = [{ n = 1, to = 1.0 }]\nmesh.rows = [{ n = 2, to = 1.0 }]\n\
@@ -435,7 +436,7 @@ fn a_mesh_from_a_file_is_that_of_the_grid() {
     assert!((hollow[0] / grid[0] - 1.0).abs() > 1e-5, "{hollow:?}");
 }
 
-/// What is wrong with a mesh's file is told with its line, and the exit code is that of bad input.
+/// Mistakes in a mesh's file are reported with their line, and the exit code is that of bad input.
 #[test]
 fn refuses_mesh_files_that_are_wrong() {
     let place = Place::new();

@@ -60,8 +60,8 @@ impl Drop for Cluster<'_> {
     }
 }
 
-/// Two runs that take longer than their two minutes, of which Slurm leaves them one at most: each ends early with a
-/// checkpoint, is sent in again, goes on, and comes to the results of a run in one go.
+/// Two runs that take longer than their two minutes, of which Slurm leaves them one at most. Each ends early with a
+/// checkpoint, is submitted again, goes on, and gives the results of an uninterrupted run.
 #[test]
 #[ignore = "ten minutes, and Slurm"]
 fn tasks_whose_time_is_over_are_sent_in_again_and_go_on() {

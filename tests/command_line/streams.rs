@@ -122,9 +122,9 @@ fn devices_and_endless_files_are_no_input() {
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
 }
 
-/// Whatever the limit, memory that runs out is reported with how much is needed, the summary says that
-/// the run has stopped, and the rows that were written are whole; with libraries that were tried before
-/// and with those that are tried within the limit.
+/// Whatever the limit, a run out of memory reports how much it needs. Its summary has the status of a
+/// stopped run, and the rows written are whole. This holds for libraries tried before and for those
+/// tried within the limit.
 #[test]
 fn memory_that_runs_out_is_said() {
     let case = concat!(env!("CARGO_MANIFEST_DIR"), "/../cases/bonded_pile");

@@ -285,7 +285,7 @@ fn saltelli_gives_indices_with_intervals() {
     assert_ne!(column(&runs, "stiffness")[0], "100000.0");
 }
 
-/// What is wrong, the edit of the study that makes it so, and what the message says; `^` marks the place.
+/// A mistake, the edit of the study that makes it, and the text of the message; `^` marks the place.
 const MISTAKES: &[(&str, &str, &str, &str)] = &[
     ("an unknown key", "title", "^titel", "unknown key `titel`"),
     (
@@ -721,8 +721,8 @@ fn family(pid: u32) -> Vec<u32> {
     found
 }
 
-/// Whoever of the processes is killed, and whenever: nothing is lost, and nothing computed twice to
-/// another end.
+/// Any process may be killed at any time: nothing is lost, and nothing computed twice with another
+/// result.
 #[test]
 fn kills_lose_nothing() {
     let undisturbed = slow();

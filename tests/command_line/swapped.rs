@@ -1,5 +1,5 @@
-//! Laws that cannot be led through the nil increment in which a law that starts is asked what it makes of the
-//! stresses it finds; and laws that cannot go on from the internal variables, or the gap, of the one before.
+//! Laws that fail in the zero increment, by which a law that starts takes over the stresses it finds. Also
+//! laws that cannot go on from the internal variables, or the gap, of the law before.
 
 use crate::program::{BAD_INPUT, DONE, JOINT, Outcome, PLUGIN_TROUBLE, Place, edited};
 use crate::troubled;

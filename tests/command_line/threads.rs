@@ -6,7 +6,8 @@ use crate::troubled;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// What is over soon is done where no thread can be had; who asks for threads is told.
+/// A short run works where no thread can be started; a request for threads then fails with a
+/// message.
 #[test]
 fn a_small_run_needs_no_thread() {
     let place = Place::new();

@@ -9,7 +9,7 @@ use std::process::Command;
 use std::sync::{Mutex, PoisonError};
 use tempfile::TempDir;
 
-/// Where a [`Place`] has its library.
+/// Path of the library in a [`Place`].
 pub(crate) fn library() -> String {
     format!("laws/{DLL_PREFIX}troubled{DLL_SUFFIX}")
 }

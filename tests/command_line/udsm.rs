@@ -222,7 +222,7 @@ fn a_stiffness_by_rows_is_read_by_rows() {
     assert!(most(ROWS) < most(""), "the tangent is that of the routine");
 }
 
-/// `iTimeDep`: the model is given true times, and a segment without one is told of.
+/// `iTimeDep`: the model receives true times, and a segment without a time is reported.
 #[test]
 fn a_model_that_depends_on_the_time_is_given_it() {
     let Some(place) = place("clock", &["udsm/clock.c"]) else {

@@ -206,8 +206,8 @@ fn a_call_that_crashes_can_be_repeated() {
     }
 }
 
-/// What a library does where no law is called: the definitions of the fixture, the check that crashes, the
-/// phase in its capsule, and what replaying that says.
+/// Crashes of a library outside the calls of laws: the definitions of the fixture, the check that crashes,
+/// the phase in its capsule, and the output of replaying it.
 const PHASES: [(&str, &str, &str, &str, &str); 13] = [
     (
         "load_crashes",
@@ -423,7 +423,7 @@ fn a_capsule_of_a_library_is_read_with_care() {
     }
 }
 
-/// What is wrong with `init_state` shows again.
+/// A defect of `init_state` shows again in a replay.
 #[test]
 fn a_wrong_initial_state_can_be_repeated() {
     for (fixture, id, says) in [
@@ -466,7 +466,8 @@ fn what_has_passed_need_not_be_read() {
     assert_eq!(last(&failed), last(&String::from_utf8(all.stdout).unwrap()));
 }
 
-/// In the process of the program a check is as in one of its own, and a law that crashes takes it along.
+/// A check in the program's process gives the same as in a separate one, and a law that crashes takes
+/// the program along.
 #[test]
 fn a_check_can_be_run_under_a_debugger() {
     let folder = folder();
@@ -484,7 +485,8 @@ fn a_check_can_be_run_under_a_debugger() {
     assert_eq!(only("integrate-works").status.code(), None);
 }
 
-/// The line of the sidecar, and the keys that there are; what every hypothesis has is told once.
+/// The message has the line of the sidecar and the keys that exist; a remark that applies to every
+/// hypothesis comes once.
 #[test]
 fn a_sidecar_that_cannot_be_read_is_told_with_its_line() {
     let umat = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/umat");
@@ -553,7 +555,7 @@ fn a_law_that_gave_up_in_an_earlier_call_fails() {
     );
 }
 
-/// Of a law that has panicked on its way, what it said then is told, and not only that it is not called again.
+/// The report on a law that panicked has its message at that time, and not only that it is not called again.
 #[test]
 fn the_first_words_of_a_law_that_gives_up_are_kept() {
     // As a law in Rust ends that panics beyond some slip.

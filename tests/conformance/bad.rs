@@ -470,7 +470,7 @@ fn what_may_be_meant_is_a_warning_of_the_check_that_names_it() {
     }
 }
 
-/// Where warnings count, they end the program as failures do; they are named among what failed, too.
+/// If warnings count, they end the program as failures do, and are named among the failures.
 #[test]
 fn warnings_count_where_that_is_asked_for() {
     let folder = folder();
@@ -491,7 +491,8 @@ fn warnings_count_where_that_is_asked_for() {
     assert!(good.checks().is_empty(), "{}", good.stdout);
 }
 
-/// What a variable of the environment and the instance that came first change is named, with both results.
+/// The effects of an environment variable, and of the instance that came first, are named with both
+/// results.
 #[test]
 fn what_comes_from_outside_of_a_call_is_named() {
     for (fixture, id, says) in [
@@ -793,7 +794,7 @@ fn a_wrong_tangent_is_told_by_row_and_column_with_both_values() {
     assert!(details.contains(says), "{details}");
 }
 
-/// What a library does when it is asked whether settings fit is left to the checks.
+/// A crash of the library while settings are tried is left to the checks.
 #[test]
 fn a_library_that_crashes_is_no_bad_setting() {
     let folder = folder();

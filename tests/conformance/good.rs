@@ -61,7 +61,7 @@ fn tz_curve_passes() {
     passes(&library_of("tz_curve"));
 }
 
-/// What creeps, relaxes, keeps rates, counts, or takes substeps by a tolerance looks faulty and is not.
+/// Laws that creep, relax, keep rates, count, or take substeps by a tolerance look faulty but are not.
 #[test]
 fn unusual_laws_pass() {
     let folder = folder();
@@ -126,7 +126,7 @@ fn the_report_is_the_same_every_time() {
     );
 }
 
-/// Ids are public: files and scripts name them. Whoever changes one has to change it here.
+/// Ids are public: files and scripts name them. A change of one needs a change here.
 #[test]
 fn ids_are_stable() {
     let output = pilum(&["check", "--list", "--json"]);

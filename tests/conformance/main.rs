@@ -1,6 +1,6 @@
-//! `pilum check`: the shipped laws pass it, every bad library fails the check that names its fault
-//! and no other, and neither `pilum check` nor, where a fault can be seen in time, `pilum point`
-//! goes down with it.
+//! `pilum check`: the shipped laws pass it, and every bad library fails only the check that names
+//! its fault. No bad library crashes `pilum check` or, if its fault can be seen in time, `pilum
+//! point`.
 
 mod aids;
 mod bad;

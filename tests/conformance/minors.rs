@@ -1,7 +1,6 @@
-//! Libraries and hosts of one major version work together, whatever their minors: a library of
+//! Libraries and hosts of one major version work together, whatever their minors. A library of
 //! version 1.0 in today's host, and today's libraries in a host of version 1.0, give the same bits
-//! as where both are of one version, and keep the contract. What is of version 1.0 is in
-//! `fixtures/contract_1_0`.
+//! as with equal versions, and keep the contract. Version 1.0 is in `fixtures/contract_1_0`.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use crate::program::{check, compiled_from, folder, library_of};

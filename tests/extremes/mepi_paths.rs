@@ -1,9 +1,9 @@
 //! MEPI with parameters at their ends, led by jumps: every increment against [`mepi_step`].
 //!
 //! Paths     shear at constant volume; shear with compression; reversals; to σ_n = 0, beyond, and back
-//!           with shear; shear that opens and closes in one increment each
-//! Lengths   hundredth to ten thousand times the slip that mobilises the friction
-//! Agrees    every increment of the path, from the state that the law left at its start
+//!           with shear; shear that opens and closes in one increment each.
+//! Lengths   hundredth to ten thousand times the slip that mobilises the friction.
+//! Agrees    every increment of the path, from the state that the law left at its start.
 
 use crate::matrix::{Family, Verdict};
 use crate::mepi_step::{Mepi, Peak, State, check};

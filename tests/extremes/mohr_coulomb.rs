@@ -1,9 +1,9 @@
 //! Mohr–Coulomb and elasticity at their ends, in the plane and in space.
 //!
 //! Implicit          every increment against all sets of up to three of the nine planes (Karush, Kuhn,
-//!                   Tucker) in the principal axes of the trial stress, in double-double numbers
-//! Other schemes     a path that turns the axes, against extrapolated small steps of that reference
-//! Elasticity        Hooke's law in double-double numbers
+//!                   Tucker) in the principal axes of the trial stress, in double-double numbers.
+//! Other schemes     a path that turns the axes, against extrapolated small steps of that reference.
+//! Elasticity        Hooke's law in double-double numbers.
 
 use crate::joint::near;
 use crate::matrix::{Family, Verdict};

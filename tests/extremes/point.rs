@@ -109,8 +109,8 @@ impl Point {
         Ok(end)
     }
 
-    /// Takes an increment, in smaller ones where the law asks for them. What each ends with is
-    /// `seen` with flux, internal variables and increment at its start.
+    /// Takes an increment, in smaller ones where the law asks for them. After each, `seen` gets
+    /// flux and internal variables at its start, the increment, and the response.
     pub(crate) fn advance(
         &mut self,
         increment: &[f64],

@@ -6,9 +6,9 @@
 //!
 //! Implicit             is backward Euler: with n and 2n increments the error of the second is no more
 //!                      than twice the difference of the two; under constant normal stress there is
-//!                      no error in τ and ξ
-//! Error-controlled     within a hundred times its tolerance, in one increment
-//! Explicit             as implicit, with its substeps for the increments
+//!                      no error in τ and ξ.
+//! Error-controlled     within a hundred times its tolerance, in one increment.
+//! Explicit             as implicit, with its substeps for the increments.
 //!
 //! Increments resolve the slips over which hardening and softening happen: where they do not, backward
 //! Euler is its own answer ([`mepi_paths`](crate::mepi_paths)) and not the rates'. The error-controlled

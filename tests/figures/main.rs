@@ -215,8 +215,8 @@ fn pictures() -> BTreeSet<PathBuf> {
         .collect()
 }
 
-/// Draws the figures of an input file as the program does: those of a variant into a folder of its
-/// own, those over all variants next to these folders.
+/// Draws the figures of an input file as the program does: those of a variant into a separate
+/// folder, those over all variants next to these folders.
 fn draw(input: &str) -> TempDir {
     let place = TempDir::new().unwrap();
     let path = cases().join(input);

@@ -1,11 +1,12 @@
 //! Two bodies in one model that do not touch.
 //!
-//! Goal        what one body carries does not loosen the tolerances of another
-//! Geometry    two blocks side by side with a wall between them whose sides are fixed
-//! Boundary    each on its own base, its outer side free; pressed from above, the first 10¹¹ times
-//!             as hard
-//! Law         mohr_coulomb, 10⁹ times as stiff in the first block; elastic in the wall
-//! Asserts     the second block carries and settles as it does alone; of one body nothing changes
+//! Goal        forces in one body do not loosen the tolerances of another.
+//! Geometry    two blocks side by side with a wall between them whose sides are fixed.
+//! Boundary    each block on a separate base, its outer side free; pressed from above, the first 10¹¹ times as
+//!             hard.
+//! Law         mohr_coulomb, 10⁹ times as stiff in the first block; elastic in the wall.
+//! Asserts     the second block carries and settles as it does alone; many bodies balance together; a body moved as a
+//!             whole has no forces; earlier loads do not widen the tolerance.
 
 use crate::setup::{Results, run};
 

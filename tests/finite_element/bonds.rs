@@ -1,8 +1,9 @@
 //! Bonds that break at the first tension.
 //!
-//! Goal        an equilibrium where one increment has none: bonded, a point opens; broken, it closes
-//! Geometry    a stiff block of height h on a bonded joint of length 1, which has a point at each end and
-//!             one in the middle, with 1/6, 1/6 and 2/3 of the joint (Simpson)
+//! Goal        an equilibrium that one increment cannot reach: taken as bonded a point opens, taken as broken it
+//!             closes.
+//! Geometry    a stiff block of height h on a bonded joint of length 1. Its points at both ends and in the middle
+//!             weigh 1/6, 1/6 and 2/3 of the joint (Simpson).
 //!
 //! ```text
 //!      p ↓ ↓ ↓ ↓
@@ -13,12 +14,12 @@
 //!     └─────────┘
 //! ```
 //!
-//! Boundary    a pressure p first, which stays; then u along the top
-//! Law         `coulomb_joint` with cohesion and without tensile strength
-//! Asserts     statics of a rigid block on two points, once A has opened: with the shear force H the
-//!             normal forces are C = 2 h H and B = p − C, their tractions 6 C and 3/2 B. A carries nothing, so the
-//!             others carry 6/5 H in shear, and stay below their strength: they are elastic, however A broke. Then
-//!             u = 2 h (6 C − 3/2 B) / `k_n` + 6/5 H / `k_t`
+//! Boundary    a pressure p first, which stays; then u along the top.
+//! Law         `coulomb_joint` with cohesion and without tensile strength.
+//! Asserts     statics of a rigid block on two points, once A has opened. With the shear force H the normal forces
+//!             are C = 2 h H and B = p − C, their tractions 6 C and 3/2 B. A carries nothing, so the others carry
+//!             6/5 H in shear and stay below their strength: they are elastic, however A broke. Then u = 2 h (6 C −
+//!             3/2 B) / `k_n` + 6/5 H / `k_t`.
 
 use crate::setup::{Failed, Results, assert_close, elastic, fail, run};
 use tests::case::run_text;
@@ -105,8 +106,7 @@ fn single_corrections_are_told() {
     assert!(phases[0]["single_corrections_from"].is_null());
     assert_eq!(phases[1]["single_corrections_from"], 3);
     let warnings = &finished.observer.warnings;
-    let says =
-        "phase `push`, increment 3: nothing found an equilibrium, as it is where bonds break";
+    let says = "phase `push`, increment 3: nothing else found an equilibrium, as where bonds break";
     assert!(warnings.iter().any(|w| w.contains(says)), "{warnings:?}");
 }
 

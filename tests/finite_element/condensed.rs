@@ -1,11 +1,10 @@
 //! Condensed and assembled equations.
 //!
-//! Goal        condensing the linear groups changes no answer; what was factorised is used again
-//! Geometry    the chamber of `cases/chamber_mesh1`, with its thin layer or a zero-thickness joint
-//! Boundary    as there
-//! Law         elastic ground; mepi, coulomb_joint
-//! Asserts     every probe of every increment within 1e-9 of its largest value; factorisations
-//!             from `summary.json`
+//! Goal        condensing the linear groups changes no results; factors are reused.
+//! Geometry    the chamber of `cases/chamber_mesh1`, with its thin layer or a zero-thickness joint.
+//! Boundary    as there.
+//! Law         elastic ground; mepi, coulomb_joint.
+//! Asserts     every probe of every increment within 1e-9 of its largest value; factorisations from `summary.json`.
 
 use crate::setup::Results as _;
 use input::Case;

@@ -1,12 +1,12 @@
-//! Cut-backs, and the end of what can be carried.
+//! Cut-backs and limit loads.
 //!
-//! Goal        smaller steps do not change the result; a load beyond the limit ends with an
-//!             error and with all results up to there
-//! Geometry    the strip footing; the thick cylinder
-//! Boundary    as there; the cylinder under pressure from inside
-//! Law         mohr_coulomb
-//! Asserts     equal limits with and without cut-backs; what is reported of the steps, by runs with other steps; error,
-//!             exit code, history, summary
+//! Goal        smaller steps do not change the result. A load beyond the limit ends with an error and with all
+//!             results up to there.
+//! Geometry    the strip footing; the thick cylinder.
+//! Boundary    as there; the cylinder under pressure from inside.
+//! Law         mohr_coulomb.
+//! Asserts     equal limits with and without cut-backs; reports of steps against runs with other steps; error, exit
+//!             code, history, summary.
 
 use crate::footing::{FRICTION, Footing, push, text};
 use crate::setup::{Results, assert_close, fail, run};

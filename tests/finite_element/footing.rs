@@ -1,7 +1,7 @@
 //! Strip footing on weightless ground: the limit load of Prandtl.
 //!
-//! Goal        bearing capacity N_c c of Tresca and of c–φ ground
-//! Geometry    half of a rigid, rough strip of half-width 1
+//! Goal        bearing capacity N_c c of Tresca and of c–φ ground.
+//! Geometry    half of a rigid, rough strip of half-width 1.
 //!
 //! ```text
 //!   ▓▓▓▓ ← w
@@ -11,11 +11,10 @@
 //!   └───┴──────────────┘
 //! ```
 //!
-//! Boundary    u_x = 0 on the axis of symmetry and on the right, u = 0 below; strip pushed down
-//! Law         mohr_coulomb
-//! Asserts     mean pressure under the strip at the end of a long push: N_c = 2 + π, or
-//!             (N_q − 1) cot φ with N_q = tan²(45° + φ/2) exp(π tan φ); from above, and closer
-//!             on the finer mesh
+//! Boundary    u_x = 0 on the axis of symmetry and on the right, u = 0 below; strip pushed down.
+//! Law         mohr_coulomb.
+//! Asserts     mean pressure under the strip at the end of a long push: N_c = 2 + π, or (N_q − 1) cot φ with N_q =
+//!             tan²(45° + φ/2) exp(π tan φ). It comes from above, and closer on the finer mesh.
 
 use crate::setup::{Finished, Results, run};
 use std::f64::consts::PI;

@@ -1,7 +1,7 @@
 //! Confinement of a pile's cross-section: the coefficient K_l.
 //!
-//! Goal        contact pressure on a stiff cylinder in elastic ground under confinement
-//! Geometry    a disc of a long cylinder around the axis, one row of elements
+//! Goal        contact pressure on a stiff cylinder in elastic ground under confinement.
+//! Geometry    a disc of a long cylinder around the axis, one row of elements.
 //!
 //! ```text
 //!   axis                                    b
@@ -10,10 +10,10 @@
 //!   0      a    a+t
 //! ```
 //!
-//! Boundary    u_z = 0 above and below, pressure outside
-//! Law         elastic; coulomb_joint in a thin layer and in a joint of no thickness
-//! Asserts     K_l against the closed form of the layered cylinder; against 2 (1 − ν) for a rigid
-//!             core in ground without end
+//! Boundary    u_z = 0 above and below, pressure outside.
+//! Law         elastic; coulomb_joint in a thin layer and in a zero-thickness joint.
+//! Asserts     K_l against the closed form of the layered cylinder, and against 2 (1 − ν) for a rigid core in
+//!             infinite ground.
 
 use crate::cylinder::{Ring, stresses_at_faces};
 use crate::setup::{Lame, Results, assert_close, elastic, run};

@@ -1,11 +1,11 @@
 //! `output.mesh_error`: the estimated error of the strains against the true one.
 //!
-//! Goal        estimate over true error (effectivity) near 1, closer on finer meshes
-//! Geometry    hollow sphere with curved sides, thick cylinder; quads and triangles; the cases of the
-//!             verification manual
-//! Law         elastic, ν = 0.3 and 0.4999
-//! Asserts     between 0.5 and 2, where more than two elements lie between the walls; between 0.9 and 1.1
-//!             on the finest quads; shares of elements add up
+//! Goal        effectivity (estimate over true error) near 1, closer on finer meshes.
+//! Geometry    hollow sphere with curved sides, thick cylinder; quads and triangles; the cases of the verification
+//!             manual.
+//! Law         elastic, ν = 0.3 and 0.4999.
+//! Asserts     effectivity between 0.5 and 2 with more than two elements between the walls, between 0.9 and 1.1 on
+//!             the finest quads; shares of elements add up.
 //!
 //! The true error is integrated here, with shape functions and a Gauss rule of this file, from the
 //! displacements of the nodes and the closed form.

@@ -1,12 +1,12 @@
 //! Methods of iteration.
 //!
-//! Goal        all methods come to the same equilibrium, the slower ones with more iterations and
-//!             fewer matrices; counters say that nothing is computed or kept without need
-//! Geometry    the chamber of `cases/chamber_mesh1`; a strip footing
-//! Boundary    as there: the first fifth of the loading; a push beyond first yield
-//! Law         mepi in a thin layer; mohr_coulomb
+//! Goal        all methods reach the same equilibrium, the slower ones with more iterations and fewer matrices.
+//!             Counters show that nothing is computed or kept without need.
+//! Geometry    the chamber of `cases/chamber_mesh1`; a strip footing.
+//! Boundary    as there: the first fifth of the loading; a push beyond first yield.
+//! Law         mepi in a thin layer; mohr_coulomb.
 //! Asserts     probes within ten times the force tolerance (for each increment so far) of full Newton's;
-//!             iterations, factorisations, law calls and bytes of `summary.json`
+//!             iterations, factorisations, law calls and bytes of `summary.json`.
 
 use crate::footing::{FRICTION, Footing};
 use crate::setup::{Finished, Results, run};

@@ -1,12 +1,12 @@
 //! Rate of convergence of the iterations.
 //!
-//! Goal        full Newton iterations with consistent tangents converge quadratically
-//! Geometry    the chamber of `cases/chamber_mesh1`; a strip footing; a thick cylinder
-//! Boundary    as there
-//! Law         mepi in a thin layer; mohr_coulomb with turning principal axes; mohr_coulomb with
-//!             fixed axes, which is linear piece by piece
-//! Asserts     from `log.jsonl`: r_(k+1) ≤ C r_k² below r = 1/(3 C), down to the floor of
-//!             round-off; with fixed axes, the floor at once when the right pieces are found
+//! Goal        full Newton iterations with consistent tangents converge quadratically.
+//! Geometry    the chamber of `cases/chamber_mesh1`; a strip footing; a thick cylinder.
+//! Boundary    as there.
+//! Law         mepi in a thin layer; mohr_coulomb with turning principal axes; mohr_coulomb with fixed axes, which
+//!             is piecewise linear.
+//! Asserts     from `log.jsonl`: r_(k+1) ≤ C r_k² below r = 1/(3 C), down to the round-off floor; with fixed axes,
+//!             the floor at once when the right pieces are found.
 
 use crate::footing::{self, FRICTION, Footing};
 use crate::setup::{Finished, Results, run};
@@ -21,8 +21,8 @@ fn full_newton(text: &str) -> String {
     format!("{text}\n[solver]\nmethod = \"newton\"\n")
 }
 
-/// Asserts r_(k+1) ≤ C r_k² (or the floor) wherever C r_k is below 1/3, and that at least so
-/// many pairs are near enough to tell and end above the floor.
+/// Asserts r_(k+1) ≤ C r_k² (or the floor) wherever C r_k is below 1/3, and that at least `least` pairs are large
+/// enough to tell.
 fn assert_quadratic(finished: &Finished, phase: &str, increments: usize, c: f64, least: usize) {
     assert_eq!(finished.observer.cut_backs, 0);
     let mut telling = 0;

@@ -1,7 +1,7 @@
 //! Patch tests of `zero_thickness`.
 //!
-//! Goal        a joint between two materials carries constant traction
-//! Geometry    a horizontal or vertical joint from boundary to boundary, or ending inside
+//! Goal        a joint between two materials carries constant traction.
+//! Geometry    a horizontal or vertical joint from boundary to boundary, or ending inside.
 //!
 //! ```text
 //!   ┌────┬───────┬──┐        ┌────┬───────┬──┐
@@ -11,12 +11,11 @@
 //!   └────┴───────┴──┘        └────┴───────┴──┘
 //! ```
 //!
-//! Boundary    the normal displacement of all four sides, their sum over the laminate with the
-//!             jump σ_n/K_n; for shear, a second phase that moves one side along the joint while
-//!             nothing moves across it; an ending joint is stressed along its line only, so that
-//!             nothing opens or slides
-//! Law         elastic ground; coulomb_joint and mepi in their elastic range
-//! Asserts     stresses, tractions and jumps of all points, PATCH
+//! Boundary    the normal displacement of all four sides: the sum over the laminate, with the jump σ_n/K_n. For
+//!             shear a second phase moves one side along the joint while nothing moves across it. A joint that ends
+//!             inside is stressed along its line only, so that nothing opens or slides.
+//! Law         elastic ground; coulomb_joint and mepi in their elastic range.
+//! Asserts     stresses, tractions and jumps of all points, PATCH.
 
 use crate::patch::{Expected, Normal, Patch};
 use crate::setup::{Lame, elastic};

@@ -1,9 +1,9 @@
 //! Patch tests of `thin_layer`.
 //!
-//! Goal        a layer between two other materials carries constant stress, whatever its law,
-//!             direction and integration; with an interface law its stresses are those of an
-//!             elastic layer with M = K_n t, G = K_t t, so κ = λ/M = 1 − 2 K_t/K_n
-//! Geometry    horizontal or vertical layers, the thin one 20 mm; also one that ends inside
+//! Goal        a layer between two other materials carries constant stress, whatever its law, direction and
+//!             integration. With an interface law its stresses are those of an elastic layer with M = K_n t, G =
+//!             K_t t, so κ = λ/M = 1 − 2 K_t/K_n.
+//! Geometry    horizontal or vertical layers, the thin one 20 mm; also one that ends inside.
 //!
 //! ```text
 //!   ┌─────┬─┬─────┐        ┌─────┬─┬─────┐
@@ -14,11 +14,11 @@
 //!   └─────┴─┴─────┘        └─────┴─┴─────┘
 //! ```
 //!
-//! Boundary    displacements of all boundary nodes, from the closed form of a laminate: with S, T
-//!             the stresses across all layers and e the strain along them,
-//!             ε_n = (S − λ e (plane strain) or 2 λ e (axisymmetric))/M, γ = T/G
-//! Law         elastic, oriented_mohr_coulomb, coulomb_joint, mepi, all in their elastic range
-//! Asserts     stresses of all points, tractions and jumps of the layer, PATCH
+//! Boundary    displacements of all boundary nodes from the closed form of a laminate. With S, T the stresses
+//!             across all layers and e the strain along them, ε_n = (S − λ e (plane strain) or 2 λ e
+//!             (axisymmetric))/M, γ = T/G.
+//! Law         elastic, oriented_mohr_coulomb, coulomb_joint, mepi, all in their elastic range.
+//! Asserts     stresses of all points, tractions and jumps of the layer, PATCH.
 
 use crate::patch::{Expected, Normal, PATCH, Patch, boundary_nodes};
 use crate::setup::{Lame, elastic};

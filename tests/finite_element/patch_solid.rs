@@ -1,7 +1,7 @@
 //! Patch tests of `solid`.
 //!
-//! Goal        constant strain is reproduced by full and reduced integration
-//! Geometry    3 × 4 elements, sizes differing by a factor of 60
+//! Goal        constant strain is reproduced by full and reduced integration.
+//! Geometry    3 × 4 elements, sizes differing by a factor of 60.
 //!
 //! ```text
 //!   y ┌───┬┬────────┐
@@ -12,10 +12,10 @@
 //!     └───┴┴────────┘
 //! ```
 //!
-//! Boundary    plane strain: u = A x with a full matrix A; axisymmetric: u_r = a r, u_z = b z,
-//!             with and without the axis
-//! Law         elastic; mohr_coulomb and the cohesion far from its reach
-//! Asserts     stress of every integration point, PATCH
+//! Boundary    plane strain: u = A x with a full matrix A; axisymmetric: u_r = a r, u_z = b z, with and without the
+//!             axis.
+//! Law         elastic; mohr_coulomb with a cohesion far from being reached.
+//! Asserts     stress of every integration point, PATCH.
 
 use crate::patch::{Expected, Patch, boundary_nodes};
 use crate::setup::{Lame, elastic};

@@ -1,9 +1,8 @@
 //! What passes from phase to phase.
 //!
-//! Goal        stress is carried over a swap of laws, internal variables stay with their law,
-//!             displacements can be reset, a support can be given up; forces balance throughout
-//! Geometry    a square of 2 × 2 elements; the sliding block; a disc on the axis with a thin
-//!             layer through it
+//! Goal        stress is carried over a swap of laws, internal variables stay with their law, displacements can be
+//!             reset, a support can be released; forces balance throughout.
+//! Geometry    a square of 2 × 2 elements; the sliding block; a disc on the axis with a thin layer through it.
 //!
 //! ```text
 //!      ↓ ↓ ↓ p
@@ -15,9 +14,9 @@
 //!    ▵    ▵    ▵
 //! ```
 //!
-//! Boundary    u_y = 0 below, u_x = 0 on the sides unless said; load or displacement above
-//! Law         elastic, mohr_coulomb; mepi, coulomb_joint
-//! Asserts     stresses, displacements and reactions against closed forms, EQUILIBRIUM
+//! Boundary    u_y = 0 below, u_x = 0 on the sides unless stated; load or displacement above.
+//! Law         elastic, mohr_coulomb; mepi, coulomb_joint.
+//! Asserts     stresses, displacements and reactions against closed forms, EQUILIBRIUM.
 
 use crate::setup::{Finished, Lame, Results, assert_close, elastic, run};
 use crate::sliding_block::{self, Kind, PRESS, coulomb, hold_top, slide};

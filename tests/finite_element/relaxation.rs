@@ -1,13 +1,15 @@
-//! Where a branch of equilibria ends.
+//! Ends of branches of equilibria.
 //!
-//! Goal        iterations that alternate between two pieces of the law come to the next stable
-//!             equilibrium by viscous relaxation, or say what they alternate between
-//! Geometry    the chamber of `cases/chamber_mesh1`, interface with means over the thickness
-//! Boundary    as there; confined in 10 increments, the head pushed by 2 mm in 20, the law swapped as that starts
-//! Law         mohr_coulomb without cohesion (not associated), mepi in the interface
-//! Asserts     equilibrium of the loads, every increment ended by Newton iterations within the
-//!             tolerance, by relaxation and under viscous control; without, exit code 2 and the point that alternates; under viscous control
-//!             the same in another unit of stress, in the mirror, and with x and y exchanged, to 1e-8
+//! Goal        iterations that alternate between two pieces of the law reach the next stable equilibrium by viscous
+//!             relaxation, or the error names the alternating point.
+//! Geometry    the chamber of `cases/chamber_mesh1`, interface with means over the thickness.
+//! Boundary    as there; confined in 10 increments, then the head pushed by 2 mm in 20; the law is swapped when
+//!             that starts.
+//! Law         mohr_coulomb without cohesion (not associated), mepi in the interface.
+//! Asserts     by relaxation and under viscous control every increment ends in equilibrium with its loads, by
+//!             Newton iterations within the tolerance. Without them, exit code 2 and the point that alternates.
+//!             Under viscous control the same in another unit of stress, mirrored, and with x and y exchanged, to
+//!             1e-8.
 
 use crate::setup::{Finished, Results, assert_close, fail, run};
 use input::Case;
@@ -117,8 +119,8 @@ fn relaxation_finds_the_next_equilibrium() {
     assert!(distance > 0.0 && distance < 0.1, "{warning}");
 }
 
-/// The same under viscous control: its states are equilibria by the same tolerance, the head gains load all the way, and
-/// ends within 1 % of where the relaxation ends (several equilibria exist).
+/// The same under viscous control: its states are equilibria by the same tolerance, the head gains load all the way,
+/// and ends within 1 % of where the relaxation ends (several equilibria exist).
 #[test]
 fn viscous_control_finds_the_next_equilibrium() {
     let viscous = run(&chamber("\n[solver]\ncontrol = \"viscous\"\n"));
@@ -244,8 +246,8 @@ normal = {{ group = "skin", quantity = "traction_n" }}
     )
 }
 
-/// The path of a viscous body is its own: relaxation has led the mirror image to another
-/// equilibrium, a thousandth away in displacements. The lift takes 140 iterations with cut-backs; mirrored and exchanged at once, round-off decides
+/// The path of a viscous body is its own: relaxation has led the mirror image to another equilibrium, a thousandth away
+/// in displacements. The lift takes 140 iterations with cut-backs; mirrored and exchanged at once, round-off decides
 /// one of them otherwise (149), and the way back starts elsewhere: that is left out.
 #[test]
 fn viscous_control_depends_on_no_unit_mirror_or_numbering() {
@@ -295,7 +297,7 @@ fn viscous_control_leads_where_steps_of_the_load_fail() {
     assert_eq!(viscous_from, [None, Some(1), None]);
     let warnings = &auto.observer.warnings;
     let says =
-        |warning: &&String| warning.contains("`lift`, increment 1: shorter and shorter steps");
+        |warning: &&String| warning.contains("`lift`, increment 1: shorter and shorter load steps");
     assert_eq!(warnings.iter().filter(says).count(), 1, "{warnings:?}");
     // The load with more halvings gets there, too.
     let halved = run(&punch(OWN, "load"));
@@ -329,13 +331,9 @@ fn what_viscous_control_led_to_is_not_said_to_be_relaxed() {
         say("; viscous control found the next equilibrium.") >= 1,
         "{warnings:?}"
     );
-    let often = warnings
-        .iter()
-        .find(|w| w.contains("steps in all"))
-        .unwrap();
     assert!(
-        often.contains("viscous control found the equilibrium of"),
-        "{often}"
+        say(": viscous control found the equilibrium of") >= 1,
+        "{warnings:?}"
     );
 }
 
@@ -373,8 +371,8 @@ impl Watch for Halts {
     }
 }
 
-/// Whoever wants no more, a full disk for one, gets the state of an equilibrium, though viscous control has committed the
-/// states on its way there before the step was taken over.
+/// A watcher that ends the run (say, as the disk is full) gets the state of an equilibrium, though viscous control has
+/// committed states on its way before the step was taken over.
 #[test]
 fn a_run_that_is_ended_after_viscous_control_has_the_state_of_an_equilibrium() {
     let source = Source::new("case.toml", punch(OWN, "viscous"));

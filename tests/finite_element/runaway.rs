@@ -1,14 +1,13 @@
-//! Mechanisms that carry an iterate away.
+//! Iterates that run away along a mechanism.
 //!
-//! Goal        what runs away is no equilibrium: the run is right, or ends with exit code 2
-//! Geometry    a steel pile next to ground on a fine mesh; a footing on a strongly graded one
-//! Boundary    ground without confinement, integration `reduced`: elements next to no stiffness
-//!             holds; head or strip pushed down
-//! Law         mohr_coulomb
-//! Asserts     head load of the pile as with more increments and with full integration (26.6 to
-//!             26.9); pressure under the footing not above N_c = 2 + π by more than the meshes of
-//!             `footing.rs` give, and reactions that balance; else no equilibrium, with what ran
-//!             away, by every method, condensed or not
+//! Goal        a runaway iterate is no equilibrium: the run is right, or ends with exit code 2.
+//! Geometry    a steel pile next to ground on a fine mesh; a footing on a strongly graded one.
+//! Boundary    ground without confinement, integration `reduced`: elements held by almost no stiffness; head or
+//!             strip pushed down.
+//! Law         mohr_coulomb.
+//! Asserts     head load of the pile as with more increments and with full integration (26.6 to 26.9). Pressure
+//!             under the footing above N_c = 2 + π by no more than on the meshes of `footing.rs`, and reactions
+//!             that balance. Otherwise no equilibrium, and the runaway is named, by every method, condensed or not.
 
 use crate::footing::{self, Footing};
 use crate::setup::{Results, fail};
@@ -308,8 +307,8 @@ displacement = [{ line = "head", y = -0.01 }]
 method = "modified_newton"
 "#;
 
-/// Corrections that grow until their squares are no numbers end the iterations there: what is reported of them is finite, and
-/// how many there were.
+/// Corrections that grow until their squares are no numbers end the iterations there: what is reported of them is
+/// finite, and how many there were.
 #[test]
 fn iterations_that_leave_all_numbers_behind_end_there() {
     let failed = fail(GROWS);

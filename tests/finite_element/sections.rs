@@ -1,11 +1,11 @@
 //! Forces through sections, and sums over areas, held against equilibrium.
 //!
-//! Goal      probes that mean what they say
-//! Geometry  a column of 3 × 4 unequal quads under an end pressure, standing and lying; a round pile
-//!           in a ring of soil with an interface along its whole shaft
-//! Asserts   the force through every section is the end load; through part of one its share; the
-//!           integral of the friction is what equilibrium leaves to the shaft; reactions next to an
-//!           interface that is absent are those of the mesh without it
+//! Goal      probes measure what they are named for.
+//! Geometry  a column of 3 × 4 unequal quads under an end pressure, standing and lying; a round pile in a ring of
+//!           soil with an interface along its whole shaft.
+//! Asserts   the force through every section is the end load; through part of one its share. The integral of the
+//!           friction is what equilibrium leaves to the shaft. Reactions next to an absent interface are those of
+//!           the mesh without it.
 
 use crate::setup::{Results, assert_close, run};
 use std::f64::consts::PI;
@@ -275,8 +275,8 @@ traction = { group = "joint", quantity = "traction_n", reduce = "integral" }
     assert_close("traction", finished.last("traction"), -50.0, EXACT, 50.0);
 }
 
-/// Two blocks with a wall between them that is absent: what holds or pushes a line that ends at the wall is that of one
-/// block, on either side and with the blocks to the right or to the left, condensed or not.
+/// Two blocks with an absent wall between them. The reaction of a line that ends at the wall is that of one block: on
+/// either side, with the blocks to the right or to the left, condensed or not.
 #[test]
 fn reactions_beside_an_interface_that_is_not_there_are_those_without_it() {
     let case = |side: f64, wall: bool, pushed: &str, equations: &str| {

@@ -1,8 +1,8 @@
 //! A block that slides on a plane.
 //!
-//! Goal        friction at constant normal force, opening and re-closure, dilation against a
-//!             spring; the same for a joint of no thickness and for a thin layer
-//! Geometry    an elastic column (the spring) on a rigid plate on the interface
+//! Goal        friction at constant normal force, opening and re-closure, dilation against a spring; the same for a
+//!             zero-thickness joint and for a thin layer.
+//! Geometry    an elastic column (the spring) on a rigid plate on the interface.
 //!
 //! ```text
 //!        pressure or u_y
@@ -15,11 +15,10 @@
 //!     └───────────┘
 //! ```
 //!
-//! Boundary    u_x = s on both sides of column and plate; base fixed; above, a pressure of
-//!             100 kPa, which is either kept or replaced by u_y = 0 (a spring)
-//! Law         coulomb_joint and mepi with K_n, K_t
-//! Asserts     traction and jump in every increment against closed forms (coulomb_joint) and
-//!             quadrature (mepi)
+//! Boundary    u_x = s on both sides of column and plate; base fixed; above, a pressure of 100 kPa, which is either
+//!             kept or replaced by u_y = 0 (a spring).
+//! Law         coulomb_joint and mepi with K_n, K_t.
+//! Asserts     traction and jump in every increment against closed forms (coulomb_joint) and quadrature (mepi).
 
 use crate::setup::{Finished, Results, assert_close, elastic, run};
 use tests::tolerance::EQUILIBRIUM;
@@ -156,8 +155,8 @@ pub(crate) fn hold_top(phase: &str) -> String {
     )
 }
 
-/// Where a layer with 2 × 2 or 3 × 3 points slides without hardening, or opens, its mid-thickness
-/// nodes have no stiffness; so only mean strain is asked for that.
+/// If a layer with 2 × 2 or 3 × 3 points slides without hardening, or opens, its mid-thickness nodes have no stiffness;
+/// so layers are tested with mean strain only.
 const KINDS: [Kind; 4] = [
     Kind::Joint("nodes"),
     Kind::Joint("full"),

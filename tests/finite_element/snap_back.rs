@@ -1,9 +1,9 @@
 //! A block pulled over a softening interface by an elastic rope.
 //!
-//! Goal        arc-length control: a snap-back under prescribed displacement, a limit load under a
-//!             prescribed force
-//! Geometry    a rigid block on a thin layer (`mean`) on a rigid base, a rope of ν = 0 next to it on
-//!             a layer that is next to nothing
+//! Goal        arc-length control: a snap-back under prescribed displacement, a limit load under a prescribed
+//!             force.
+//! Geometry    a rigid block on a thin layer (`mean`) on a rigid base, a rope of ν = 0 next to it on a layer almost
+//!             without stiffness.
 //!
 //! ```text
 //!        100 kPa
@@ -14,10 +14,10 @@
 //!     └─────────────────────────────┘
 //! ```
 //!
-//! Boundary    base fixed; a pressure of 100 kPa on the block; the rope's end pulled
-//! Law         mepi_softening with mu_r half of mu_p
-//! Asserts     force by slip against equations (10) and (11), u = slip + F/k, the extremes of u,
-//!             the limit force; with condensed and with assembled equations
+//! Boundary    base fixed; a pressure of 100 kPa on the block; the rope's end pulled.
+//! Law         mepi_softening with mu_r half of mu_p.
+//! Asserts     force by slip against equations (10) and (11), u = slip + F/k, the extremes of u, the limit force;
+//!             with condensed and with assembled equations.
 //!
 //! The rope pulls 10 mm above the interface, so the normal stress varies by some percent along it,
 //! about 100 kPa in the mean: forces are compared to 2e-3 of the largest.

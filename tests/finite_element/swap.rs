@@ -1,9 +1,9 @@
 //! What a law makes of the stress it finds at the start of a phase.
 //!
-//! Goal        the stress that a swap changes is reported, and the force that this leaves out of balance is
-//!             taken off in proportion to the phase's course; the way there does not matter where the
-//!             path does not, and by how much where it does; a resumed run has the same bits
-//! Geometry    a square between smooth walls, 1 × 1; a strip on ground; the sliding block
+//! Goal        stress changed by a swap is reported, and the force that this leaves out of balance is removed in
+//!             proportion to the phase's course. In elastic ground one swap ends where two do; in yielding ground
+//!             they differ by given amounts. A resumed run has the same bits.
+//! Geometry    a square between smooth walls, 1 × 1; a strip on ground; the sliding block.
 //!
 //! ```text
 //!      ↓ ↓ ↓ p
@@ -13,9 +13,9 @@
 //!     ▵  ▵  ▵
 //! ```
 //!
-//! Boundary    u_y = 0 below, u_x = 0 on the sides, p = 80 kPa; the block held where it has slid to
-//! Law         elastic, then mohr_coulomb with φ = 0; coulomb_joint, then one with less friction
-//! Asserts     stresses and displacements against closed forms, EQUILIBRIUM; messages with their numbers
+//! Boundary    u_y = 0 below, u_x = 0 on the sides, p = 80 kPa; the block held where it has slid to.
+//! Law         elastic, then mohr_coulomb with φ = 0; coulomb_joint, then one with less friction.
+//! Asserts     stresses and displacements against closed forms, EQUILIBRIUM; messages with their numbers.
 //!
 //! Elastic, ν = 1/4: σ_22 = −p, σ_11 = σ_33 = −p/3, so the mean is −5p/9 and the deviator
 //! q = 2p/3 = 53.3 kPa. Tresca with c returns it at the same strain to q = 2c with the same mean:
@@ -204,7 +204,7 @@ settlement = {{ line = "strip", quantity = "displacement_y", scale = -1.0 }}
     run(&text).last("settlement")
 }
 
-/// The table of the page on swaps: what increments do fades, what the way does stays.
+/// The table of the page on swaps: the effect of increments fades, that of the way stays.
 #[test]
 fn where_ground_yields_one_swap_and_two_differ_by_their_increments_and_by_the_way() {
     let [coarse, ten, twenty, forty] = [1, 10, 20, 40].map(|n| [strip(n, false), strip(n, true)]);
@@ -356,7 +356,7 @@ fn a_run_stopped_after_a_swap_goes_on_to_the_same_bits() {
     assert_eq!(a.lines().count(), 6);
 }
 
-/// What rounding leaves in a joint that carries nothing is no stress that a law could change.
+/// Round-off in a joint that carries nothing is not reported as a stress changed by a law.
 #[test]
 fn a_swap_says_nothing_of_stresses_that_are_round_off() {
     let joint = |cohesion: f64| {

@@ -1,8 +1,8 @@
 //! Thick cylinder under pressure from inside.
 //!
-//! Goal        convergence in elasticity; the spread of yielding and the limit pressure of
-//!             Tresca and Mohr–Coulomb ground
-//! Geometry    a ring of one row of elements, b = 2 a
+//! Goal        convergence in elasticity; the spread of yielding and the limit pressure of Tresca and Mohr–Coulomb
+//!             ground.
+//! Geometry    a ring of one row of elements, b = 2 a.
 //!
 //! ```text
 //!   axis     a          b
@@ -11,10 +11,10 @@
 //!   │        ├──────────┤
 //! ```
 //!
-//! Boundary    u_z = 0 above and below; pressure, or displacement, of the inner wall
-//! Law         elastic; mohr_coulomb with φ = 0 and φ = 30°, ψ = 0 and ψ = φ
-//! Asserts     order of convergence of displacements and stresses; pressure against the closed
-//!             form for the same displacement of the outer wall, increment by increment; limit
+//! Boundary    u_z = 0 above and below; pressure, or displacement, of the inner wall.
+//! Law         elastic; mohr_coulomb with φ = 0 and φ = 30°, ψ = 0 and ψ = φ.
+//! Asserts     order of convergence of displacements and stresses. Pressure against the closed form for the same
+//!             displacement of the outer wall, increment by increment; limit.
 
 use crate::setup::{Finished, Results, assert_close, elastic, run};
 use std::f64::consts::PI;

@@ -1,8 +1,8 @@
 //! Thin layers: what is refused, and the variant with mean strain.
 //!
-//! Goal        impossible or ambiguous layers are refused where they stand; the variant `mean`
-//!             has no stiffness-free modes and agrees with `full`
-//! Geometry    a layer element, alone or on a block of ground; the chamber of `cases/chamber_mesh1`
+//! Goal        impossible or ambiguous layers are refused with their place; the variant `mean` has no
+//!             stiffness-free modes and agrees with `full`.
+//! Geometry    a layer element, alone or on a block of ground; the chamber of `cases/chamber_mesh1`.
 //!
 //! ```text
 //!        p
@@ -12,10 +12,10 @@
 //!    ▵       ▵
 //! ```
 //!
-//! Boundary    pressures all round, three supports
-//! Law         coulomb_joint, mepi
-//! Asserts     kind and place of errors; stresses and displacements, EQUILIBRIUM; curves of
-//!             the chamber within a stated part
+//! Boundary    pressures all round, three supports.
+//! Law         coulomb_joint, mepi.
+//! Asserts     kind and place of errors; stresses and displacements, EQUILIBRIUM; curves of the chamber within a
+//!             stated fraction.
 
 use crate::setup::{Results, assert_close, elastic, fail, run};
 use input::Error;

@@ -1,10 +1,10 @@
-//! A layer that unloads to no stress at all, and a model in which nothing is to move.
+//! A layer that unloads to zero stress, and a model in which nothing is to move.
 //!
-//! Goal        the end of unloading does not depend on which way up the model stands
-//! Geometry    a thin layer between two slabs, in the middle of the left part of a body
-//! Boundary    rollers below and left; head pushed by 0.1 mm and taken back
-//! Law         elastic; mepi in the layer, whose stiffness vanishes with its traction
-//! Asserts     both ways up: no force is left at the end
+//! Goal        the end of unloading does not depend on which way up the model is.
+//! Geometry    a thin layer between two slabs, in the middle of the left part of a body.
+//! Boundary    rollers below and left; head pushed by 0.1 mm and taken back.
+//! Law         elastic; mepi in the layer, whose stiffness vanishes with its traction.
+//! Asserts     both ways up: no force is left at the end.
 
 use crate::setup::{Results, assert_close, run};
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use tests::needs::compiler;
 use tests::place::{Outcome, Place};
 
-/// What a command does not do within this time is stopped as by Ctrl-C: it has read its files and opened its laws by then.
+/// A command that takes longer than this is stopped as by Ctrl-C: it has read its files and opened its laws by then.
 const LONG_ENOUGH: f64 = 1.0;
 
 /// Files and names that the reader brings.

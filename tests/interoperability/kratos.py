@@ -96,8 +96,8 @@ def main():
     strategy.Initialize()
     head = [part.Nodes[node + 1] for node in mesh.nodes_of("head")]
     iterations = []
-    # The iteration starts from the last displacements in proportion, the first of them from a very small push: with
-    # the head alone displaced, the soil beside it would yield at once, and full Newton iterations cycle.
+    # The iteration starts from the last displacements in proportion, the first of them from a very small push. With
+    # the head alone displaced, the soil next to it would yield at once, and full Newton iterations cycle.
     times = [FIRST, *range(1, int(increments) + 1)]
     for step, (before, time) in enumerate(zip([None, *times], times)):
         part.CloneTimeStep(float(time))

@@ -1,8 +1,8 @@
 //! Laws in other programs, and laws of other programs here. Routes and traps: abi/interoperability.md.
 //!
-//! What needs OpenGeoSys, Kratos or SALib is passed over with a remark where they are not installed, or
-//! fails (`tests::needs`): `install.sh` next to this file installs them. What needs DOLFINx is passed over
-//! with a remark in any case: `cases/distributed/install.sh` installs it.
+//! Tests that need OpenGeoSys, Kratos or SALib are skipped with a remark if these are not installed, or
+//! fail (`tests::needs`): `install.sh` next to this file installs them. Tests that need DOLFINx never fail
+//! for lack of it, but are skipped with a remark: `cases/distributed/install.sh` installs it.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 mod distributed;
@@ -76,8 +76,8 @@ struct BondedPile {
     points: Vec<[f64; 6]>,
 }
 
-/// What an iteration leaves of the residual is a difference of the stresses of about its size, up to
-/// twice as much here: at the default of 1e-9 that is more than what is compared.
+/// A residual left by the iteration makes stresses differ by about its size, here by up to twice as
+/// much: at the default of 1e-9 that exceeds the tolerance of the comparison.
 const SOLVER: &str = "[solver]\nforce_tolerance = 1e-12\ndisplacement_tolerance = 1e-9\n";
 
 impl BondedPile {

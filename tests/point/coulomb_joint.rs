@@ -1,11 +1,11 @@
 //! Coulomb joint with constant dilatancy.
 //!
-//! Goal        sliding under the boundary conditions of the shear box, opening, re-closure
-//! Set-up      traction −100 kPa normal to the joint, shear jump to 4 mm
-//! Law         coulomb_joint: K_n = 1e6 kPa/m, K_t = 4e5 kPa/m, c = 5 kPa, φ = 35°, ψ = 13.5°
-//! Asserts     piecewise linear closed forms in every row
+//! Goal        sliding under the boundary conditions of the shear box, opening, re-closure.
+//! Set-up      traction −100 kPa normal to the joint, shear jump to 4 mm.
+//! Law         coulomb_joint: K_n = 1e6 kPa/m, K_t = 4e5 kPa/m, c = 5 kPa, φ = 35°, ψ = 13.5°.
+//! Asserts     piecewise linear closed forms in every row.
 //!
-//! With a spring K behind the joint, σ_n = σ_0 + K_s tan ψ ξ, K_s = K K_n/(K + K_n), and ξ follows from
+//! With a spring K behind the joint, σ_n = σ_0 + K_s tan ψ ξ, K_s = K K_n/(K + K_n). Slip ξ follows from
 //! K_t (u − ξ) = c + σ_n tan φ: ξ = (K_t u − c − σ_0 tan φ)/(K_t + K_s tan φ tan ψ).
 
 use crate::driver::{Run, follow};

@@ -1,10 +1,10 @@
 //! Cyclic joint.
 //!
-//! Goal        degradation at constant normal stiffness, constant stress and constant volume, opening
-//! Set-up      traction −100 kPa normal to the joint, slip between ± 1 mm, or to 10 mm
+//! Goal        degradation at constant normal stiffness, constant stress and constant volume, opening.
+//! Set-up      traction −100 kPa normal to the joint, slip between ± 1 mm, or to 10 mm.
 //! Law         cyclic_joint: K_n = 1e6 kPa/m, K_t = 4e5 kPa/m, φ_p = 35°, φ_r = 25° over 20 mm, contraction
-//!             of 1° over 4 mm
-//! Asserts     σ_n = σ_0 − K_s c(ξ), τ = μ(ξ) σ_n and ξ along the cycles in closed form
+//!             of 1° over 4 mm.
+//! Asserts     σ_n = σ_0 − K_s c(ξ), τ = μ(ξ) σ_n and ξ along the cycles in closed form.
 //!
 //! With a spring K behind the joint, K_s = K K_n/(K + K_n). Between reversals K_t (u − u_0) = ± (τ − τ_0)
 //! + K_t (ξ − ξ_0): an equation in ξ for every jump, solved here by bisection.

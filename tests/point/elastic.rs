@@ -1,9 +1,9 @@
 //! Isotropic elasticity at a point.
 //!
-//! Goal        moduli and Poisson effects of the elementary tests
-//! Set-up      one point, mixed control, increments from an initial stress
-//! Law         elastic: E = 34 MPa, ν = 0.3
-//! Asserts     E, ν, M, G and plane strain against Hooke's law, in every row
+//! Goal        moduli and Poisson effects of the elementary tests.
+//! Set-up      one point, mixed control, increments from an initial stress.
+//! Law         elastic: E = 34 MPa, ν = 0.3.
+//! Asserts     E, ν, M, G and plane strain against Hooke's law, in every row.
 
 use crate::driver::{Run, follow};
 use approx::assert_relative_eq;

@@ -1,10 +1,10 @@
 //! Hyperbolic joint.
 //!
-//! Goal        hyperbola, strength, reversal, opening and re-closure under the driver
-//! Set-up      traction −100 kPa normal to the joint, or −400 kPa; shear jump to 4 mm
+//! Goal        hyperbola, strength, reversal, opening and re-closure under the driver.
+//! Set-up      traction −100 kPa normal to the joint, or −400 kPa; shear jump to 4 mm.
 //! Law         hyperbolic_joint: K_n = 1e7 kPa/m, K = 20 000, n = 0.6, R_f = 0.85, c_a = 4 kPa, δ = 30°,
-//!             K_ur = 30 000
-//! Asserts     the hyperbola of Clough and Duncan in every row, at any number of increments
+//!             K_ur = 30 000.
+//! Asserts     the hyperbola of Clough and Duncan in every row, at any number of increments.
 //!
 //! The law neither dilates nor contracts, so a spring behind the joint keeps its force.
 

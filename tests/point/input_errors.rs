@@ -1,9 +1,9 @@
 //! What the driver refuses.
 //!
-//! Goal        every slip in a driver file gives one message at its place and exit code 1
-//! Set-up      a driver with one fault each
-//! Law         elastic, coulomb_joint, mepi
-//! Asserts     exit code, key facts of the message, the underlined text
+//! Goal        every slip in a driver file gives one message at its place and exit code 1.
+//! Set-up      a driver with one fault each.
+//! Law         elastic, coulomb_joint, mepi.
+//! Asserts     exit code, key facts of the message, the underlined text.
 
 use crate::driver::attempt;
 use input::{Driver, Error};

@@ -1,9 +1,9 @@
 //! Interfaces in three dimensions: two tangential directions.
 //!
-//! Goal        friction that is alike in all directions along the interface
-//! Set-up      one point, normal traction and both slips led
-//! Law         coulomb_joint
-//! Asserts     closed forms, the law in two dimensions, mistakes at their place
+//! Goal        friction that is alike in all directions along the interface.
+//! Set-up      one point, normal traction and both slips led.
+//! Law         coulomb_joint.
+//! Asserts     closed forms, the law in two dimensions, mistakes at their place.
 
 use crate::driver::{attempt, follow};
 use approx::assert_relative_eq;
@@ -44,9 +44,9 @@ fn friction_points_along_the_slip() {
     }
 }
 
-/// While the slip w goes on in a new direction, at the angle θ₀ to the friction, the joint yields:
-/// dτ/dw = K_t (m − (m·e) e) with m the new direction and e that of τ, so that θ' = −(K_t/|τ|) sin θ and
-/// tan θ/2 = tan θ₀/2 · e^(−K_t w/|τ|).
+/// While the slip w goes on in a new direction m, at the angle θ₀ to the friction, the joint yields.
+/// With e the direction of τ, dτ/dw = K_t (m − (m·e) e). Therefore θ' = −(K_t/|τ|) sin θ and tan θ/2 =
+/// tan θ₀/2 · e^(−K_t w/|τ|).
 #[test]
 fn friction_turns_after_the_slip() {
     let length = strength() / K_T;

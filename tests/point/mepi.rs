@@ -1,9 +1,9 @@
 //! MEPI without softening in the shear box.
 //!
-//! Goal        the three boundary conditions of the interface shear box, reversal, contact
-//! Set-up      σ_n = 100 kPa, shear jump to 2 mm
-//! Law         mepi: Table IV (1) of De Gennaro & Frank, p_0 = σ_ni = 100 kPa
-//! Asserts     τ and ξ in closed form; σ_n and [u_n] by quadrature, first order in the increment
+//! Goal        the three boundary conditions of the interface shear box, reversal, contact.
+//! Set-up      σ_n = 100 kPa, shear jump to 2 mm.
+//! Law         mepi: Table IV (1) of De Gennaro & Frank, p_0 = σ_ni = 100 kPa.
+//! Asserts     τ and ξ in closed form; σ_n and [u_n] by quadrature, first order in the increment.
 //!
 //! At constant normal stress [u_t] = ξ + μ(ξ) σ_n/K_t is a quadratic in ξ with (10).
 

@@ -1,9 +1,9 @@
 //! MEPI with softening in the shear box, with both readings of the peak.
 //!
-//! Goal        peak, softening and residual friction; the jump of the published reading
-//! Set-up      σ_n = 100 kPa, shear jump to 6 mm
-//! Law         mepi_softening: Fontainebleau sand of Table I of De Gennaro & Frank, u_tp in m
-//! Asserts     τ = μ(ξ) σ_n in closed form; [u_n] and σ_n by quadrature, first order
+//! Goal        peak, softening and residual friction; the jump of the published reading.
+//! Set-up      σ_n = 100 kPa, shear jump to 6 mm.
+//! Law         mepi_softening: Fontainebleau sand of Table I of De Gennaro & Frank, u_tp in m.
+//! Asserts     τ = μ(ξ) σ_n in closed form; [u_n] and σ_n by quadrature, first order.
 
 use crate::driver::{Run, follow};
 use crate::mepi::converges_linearly;

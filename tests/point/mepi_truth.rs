@@ -3,10 +3,10 @@
 //! Compression and contraction positive. In monotonic shear ξ is the plastic slip, and with a spring
 //! of stiffness K behind the interface everything follows from ξ alone:
 //!
-//! - contraction of the flow: I(ξ) = ∫ (μ_c − μ) dξ, Eq. (14), (16), (17)
-//! - normal stress: σ_n = σ_0 − K_s I(ξ), K_s = K K_n/(K + K_n): 0 at constant normal stress, K_n at
-//!   constant volume
-//! - shear: τ = μ(ξ) σ_n, Eq. (9), and [u_t] = ξ + τ/K_t, Eq. (6)
+//! - Contraction of the flow: I(ξ) = ∫ (μ_c − μ) dξ, Eq. (14), (16), (17).
+//! - Normal stress: σ_n = σ_0 − K_s I(ξ), K_s = K K_n/(K + K_n): 0 at constant normal stress, K_n at
+//!   constant volume.
+//! - Shear: τ = μ(ξ) σ_n, Eq. (9), and [u_t] = ξ + τ/K_t, Eq. (6).
 
 /// Constants of one point.
 #[derive(Clone, Copy, Debug)]
@@ -122,8 +122,8 @@ impl Mepi {
         }
     }
 
-    /// The state at a shear displacement, by bisection over ξ. Where μ jumps up at u_tp, the response
-    /// is elastic between the two values.
+    /// The state at a shear displacement, by bisection over ξ. If μ jumps up at u_tp, the response is
+    /// elastic between the two values.
     pub(crate) fn at(&self, jump: f64, sigma_0: f64, k_s: f64) -> State {
         let (mut low, mut high) = (0.0, jump);
         for _ in 0..60 {

@@ -1,9 +1,9 @@
 //! Mohr–Coulomb in the elementary tests of soil mechanics.
 //!
-//! Goal        strength, dilatancy and paths on faces, edges, apex and tension planes
-//! Set-up      triaxial compression and extension, oedometer, simple shear, tension
-//! Law         mohr_coulomb: E = 34 MPa, ν = 0.3 or 0.1, c = 10 kPa, φ = 36.5°, ψ = 12°
-//! Asserts     σ_1 = σ_3 K_p + 2c √K_p; slopes of volume; Davis' strength in simple shear
+//! Goal        strength, dilatancy and paths on faces, edges, apex and tension planes.
+//! Set-up      triaxial compression and extension, oedometer, simple shear, tension.
+//! Law         mohr_coulomb: E = 34 MPa, ν = 0.3 or 0.1, c = 10 kPa, φ = 36.5°, ψ = 12°.
+//! Asserts     σ_1 = σ_3 K_p + 2c √K_p; slopes of volume; Davis' strength in simple shear.
 //!
 //! Strength in simple shear: Davis, E. H. (1968) Theories of plasticity and the failure of soil
 //! masses: τ = (σ_n + c cot φ) sin φ cos ψ/(1 − sin φ sin ψ) once the stresses are steady, where

@@ -1,10 +1,10 @@
 //! Two openers of libraries in one process.
 //!
-//! Goal        neither trust nor what is open goes from one to the other
-//! Set-up      a library that no one has seen before, opened in two threads by turns. Whoever probes
-//!             or isolates starts this program, which is not `pilum`: it is refused
-//! Law         elastic
-//! Asserts     who gets the library, and which copy
+//! Goal        neither trust nor what is open goes from one to the other.
+//! Set-up      a library that no one has seen before, opened in two threads by turns. Probing or
+//!             isolating would start this program, which is not `pilum`: it is refused.
+//! Law         elastic.
+//! Asserts     who gets the library, and which copy.
 
 use law::{Opener, SearchPath, Trust};
 use std::fs;

@@ -1,9 +1,9 @@
 //! Mohr–Coulomb on a facet.
 //!
-//! Goal        simple shear along the facet, at constant normal stress and at constant volume
-//! Set-up      axes of the facet: 11 along, 22 normal; 12 strained, 11 held
-//! Law         oriented_mohr_coulomb: E = 34 MPa, ν = 0.3, c = 3 kPa, φ = 35°, ψ = 13.5°
-//! Asserts     bilinear closed forms in every row
+//! Goal        simple shear along the facet, at constant normal stress and at constant volume.
+//! Set-up      axes of the facet: 11 along, 22 normal; 12 strained, 11 held.
+//! Law         oriented_mohr_coulomb: E = 34 MPa, ν = 0.3, c = 3 kPa, φ = 35°, ψ = 13.5°.
+//! Asserts     bilinear closed forms in every row.
 //!
 //! After yield at constant normal stress τ = c + σ_n tan φ and dε_22 = tan ψ dγ. At constant volume
 //! G (γ − γ_p) = c + (σ_0 + M tan ψ γ_p) tan φ.

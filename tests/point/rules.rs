@@ -1,9 +1,9 @@
 //! The rules of the driver.
 //!
-//! Goal        each rule of the file format and the table, one by one
-//! Set-up      the shortest driver that shows it
-//! Law         elastic, coulomb_joint, mepi, mohr_coulomb
-//! Asserts     values, warnings, exit codes, files
+//! Goal        each rule of the file format and the table, one by one.
+//! Set-up      the shortest driver that shows it.
+//! Law         elastic, coulomb_joint, mepi, mohr_coulomb.
+//! Asserts     values, warnings, exit codes, files.
 
 use crate::driver::{attempt, csv, follow};
 use crate::mepi::PARAMETERS;

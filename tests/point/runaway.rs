@@ -1,9 +1,9 @@
 //! Goals that a law cannot meet, however far its free components run.
 //!
-//! Goal        a flux that is controlled is met, or the increment ends the path with exit code 2
-//! Set-up      fluxes beyond strength, on laws that yield without end and on contacts that are open
-//! Law         mepi, mohr_coulomb, coulomb_joint
-//! Asserts     exit code, message, every row that is written; and that what has a solution still does
+//! Goal        a flux that is controlled is met, or the increment ends the path with exit code 2.
+//! Set-up      fluxes beyond strength, on laws that yield without end and on contacts that are open.
+//! Law         mepi, mohr_coulomb, coulomb_joint.
+//! Asserts     exit code, message, every row that is written; and that what has a solution still does.
 
 use crate::driver::{Run, attempt, follow};
 use approx::assert_relative_eq;

@@ -1,9 +1,9 @@
 //! Equilibrium where the tangent of the free components is singular.
 //!
-//! Goal        a solution is found wherever there is one, and none where absent
-//! Set-up      strain paths with random directions; then the same end with some stresses prescribed
-//! Law         mohr_coulomb with and without cohesion, dilatancy and tension cut-off; elastic
-//! Asserts     every prescribed stress is met; stresses beyond strength give exit code 2
+//! Goal        a solution is found wherever there is one, and none where absent.
+//! Set-up      strain paths with random directions; then the same end with some stresses prescribed.
+//! Law         mohr_coulomb with and without cohesion, dilatancy and tension cut-off; elastic.
+//! Asserts     every prescribed stress is met; stresses beyond strength give exit code 2.
 
 use crate::driver::{attempt, follow};
 

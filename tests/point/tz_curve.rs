@@ -1,9 +1,9 @@
 //! Load transfer curves of Frank and Zhao.
 //!
-//! Goal        the curves of shaft and base under the driver, led by movement and by stress
-//! Set-up      shaft at −50 kPa normal to it, slip to 5 mm and back; base pressed by 60 mm, lifted, pressed
-//! Law         tz_curve, qz_curve: E_M = 12 MPa, D = 0.6 m, both soils, q_s = 80 kPa, q_b = 2000 kPa
-//! Asserts     corners and slopes of the source in every row; the movement at which a stress is reached
+//! Goal        the curves of shaft and base under the driver, led by movement and by stress.
+//! Set-up      shaft at −50 kPa normal to it, slip to 5 mm and back; base pressed by 60 mm, lifted, pressed.
+//! Law         tz_curve, qz_curve: E_M = 12 MPa, D = 0.6 m, both soils, q_s = 80 kPa, q_b = 2000 kPa.
+//! Asserts     corners and slopes of the source in every row; the movement at which a stress is reached.
 
 use crate::driver::{Run, follow};
 use approx::assert_relative_eq;

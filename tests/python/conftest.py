@@ -32,7 +32,7 @@ def missing(what: str) -> None:
 
 
 def compiled(source: str, into: Path, *options: str) -> Path:
-    """A library of a source in `tests/fixtures`, with its sidecar beside it."""
+    """A library of a source in `tests/fixtures`, with its sidecar next to it."""
     path = ROOT / "tests/fixtures" / source
     compiler = shutil.which("cc" if path.suffix == ".c" else "gfortran")
     if compiler is None:

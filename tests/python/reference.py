@@ -29,7 +29,7 @@ ORDER = [
 
 
 def bless() -> bool:
-    """Whether the page is to be written anew."""
+    """Whether to rewrite the page."""
     return bool(os.environ.get("PILUM_BLESS"))
 
 
@@ -82,7 +82,7 @@ def attributes(kind: type) -> Iterator[tuple[str, str]]:
 
 
 def members(kind: type) -> Iterator[tuple[str, str]]:
-    """Public methods and properties of a class; those of one in Rust have no order of their own."""
+    """Public methods and properties of a class; those of a class in Rust have no inherent order."""
     all_of_it = list(vars(kind).items())
     if is_native(kind):
         all_of_it.sort(key=lambda item: (not callable(item[1]), item[0]))

@@ -107,7 +107,7 @@ def test_stubs_have_what_the_module_has() -> None:
 
 
 def test_types_are_checked(here: Path) -> None:
-    """mypy is content with the package, and with the stubs beside the module."""
+    """mypy accepts the package, and the stubs next to the module."""
     if importlib.util.find_spec("mypy") is None:
         missing("mypy")
     for check in (["mypy", "--strict", "-p", "pilum"], ["mypy.stubtest", "pilum._pilum", "--ignore-missing-stub"]):

@@ -146,7 +146,7 @@ def test_a_state_is_made_of_what_was_kept_of_it() -> None:
     # Its own variables are others: it would answer otherwise.
     fresh = law.initial(gradient=kept["gradient"], flux=kept["flux"])
     assert not np.array_equal(law.integrate(2 * slips(20), fresh)[0], expected)
-    # One row is that of all; another number of rows, or of variables, is none.
+    # One row applies to all points; another number of rows, or of variables, is refused.
     one = law.initial(3, internal=state.internal[5])
     assert np.array_equal(one.internal, np.tile(state.internal[5], (3, 1)))
     with pytest.raises(ValueError, match="internal: found 20 rows, expected 4"):
@@ -218,7 +218,7 @@ def test_a_state_that_was_given_as_out_is_none_any_more() -> None:
     with pytest.raises(ValueError, match="came to no end"):
         law.integrate(slips(3), spare)
     law.integrate(slips(3), start, out=spare)
-    # What was handed out of it is no start of an increment into it.
+    # Arrays handed out of a state cannot start an increment that writes into it.
     _, _, spare = law.integrate(slips(3), start)
     with pytest.raises(ValueError, match="its memory is in use"):
         law.integrate(spare.gradient, start, out=spare)
@@ -446,7 +446,7 @@ def test_arrays_that_are_not_aligned_are_named() -> None:
         with pytest.raises(pilum.Error, match=rf"^{name}: .*not aligned.*`{name}.copy\(\)`"):
             call()
     assert np.array_equal(law.integrate(jumps.copy(), start)[0], law.integrate(slips(4), start)[0])
-    # What is copied in any case is copied here too; what has no numbers lies nowhere.
+    # Arrays that are copied anyway may be misaligned; empty arrays have no alignment.
     assert np.array_equal(law.integrate(jumps[::2], law.initial(2))[0], law.integrate(slips(4)[::2], law.initial(2))[0])
     assert len(law.integrate(misaligned(np.zeros((0, 2))))[0]) == 0
 
@@ -507,7 +507,7 @@ def test_a_library_that_crashes_takes_nobody_along(tmp_path: Path) -> None:
 
 
 def test_calls_cost_little_beside_the_law() -> None:
-    """What a call takes beside its points is below a hundredth of 10⁵ points of MEPI (CPU time)."""
+    """The overhead of a call is below a hundredth of 10⁵ points of MEPI (CPU time)."""
     law = pilum.Law("mepi", **TABLE_4)
 
     def cost(n: int, times: int) -> float:

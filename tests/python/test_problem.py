@@ -121,7 +121,7 @@ def test_meshio_comes_to_the_same_bits(tmp_path: Path) -> None:
     expected = pushed(pilum.Problem(slice_case(), mesh).start())
     for other in (by_sets, by_tags):
         assert pushed(pilum.Problem(slice_case(), other).start()) == expected
-    # And by way of a file, which the program reads as it is.
+    # Also by way of a file, which the program reads unchanged.
     meshio.write(tmp_path / "slice.msh", by_tags, file_format="gmsh22", binary=False)
     from_file = {**slice_case(), "mesh": {"file": tmp_path / "slice.msh"}}
     np.testing.assert_allclose(pushed(pilum.Problem(from_file).start()), expected, rtol=1e-9)
@@ -142,7 +142,7 @@ def test_meshio_keeps_names_of_entities_that_are_turned_round(tmp_path: Path) ->
     mesh = pilum.Mesh.from_meshio(meshio.read(path))
     assert {name: sum(map(len, parts)) for name, parts in mesh.lines.items()} == {"bottom": 1, "top": 2}
     assert sorted(mesh.groups) == ["block", "whole"]
-    # What is in no physical group has the number 0, and no name.
+    # Cells in no physical group have the number 0, and no name.
     nameless = meshio.Mesh(
         mesh.nodes, [("quad", [[0, 1, 2, 3]])], cell_data={"gmsh:physical": [np.array([0])]}
     )
@@ -348,7 +348,7 @@ def test_what_the_mesh_lacks_is_said() -> None:
 
 
 def test_a_law_that_crashes_says_where(tmp_path: Path) -> None:
-    """A library that aborts, called in a process of its own."""
+    """A library that aborts, called in a separate process."""
     library = compiled("bad_abort.c", tmp_path, f"-I{pilum.include()}")
     case = slice_case()
     case["law_path"] = [library.parent]
@@ -438,7 +438,7 @@ def test_a_state_goes_to_the_same_problem_alone() -> None:
     ]:
         with pytest.raises(pilum.InputError, match=says):
             pilum.Problem(case, mesh).start().go_to(state)
-    # What comes after it may differ, and how it is sought.
+    # Later phases may differ, and how equilibrium is sought.
     other = pilum.Problem({**longer, "solver": dict(max_iterations=50)}, slice_mesh()).start()
     other.go_to(state)
     np.testing.assert_allclose(pushed(other)[:8], pushed(simulation), rtol=1e-9)
@@ -465,7 +465,7 @@ def test_rows_of_results_are_those_of_the_mesh() -> None:
     of_mesh = np.full(nodes.shape, np.nan)
     of_mesh[rows] = simulation.displacements
     np.testing.assert_allclose(np.delete(of_mesh, at, axis=0), plain.displacements, rtol=1e-9, atol=1e-15)
-    # Both sides of an interface are nodes of their own.
+    # Both sides of an interface have separate nodes.
     case, mesh = block()
     rows = pilum.Problem(case, mesh).start().mesh_rows
     assert rows[: len(mesh.nodes)].tolist() == list(range(len(mesh.nodes)))

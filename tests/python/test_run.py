@@ -124,7 +124,7 @@ def test_pandas_and_polars_take_tables(chamber: pilum.Results) -> None:
 
 @pytest.fixture(scope="module")
 def named(tmp_path_factory: pytest.TempPathFactory) -> pilum.Results:
-    """Phases and a group of names that others take for missing values or numbers; a law that is not there for 100 rows."""
+    """Phases and a group with names that others take for missing values or numbers; a law absent for 100 rows."""
     joint = pilum.Law(
         "coulomb_joint", normal_stiffness=1e6, shear_stiffness=1e6, cohesion=0.0, friction_angle=30.0, dilatancy_angle=0.0
     )

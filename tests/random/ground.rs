@@ -357,7 +357,7 @@ impl Ground {
         problem
     }
 
-    /// Load on the bottom at the end of a phase, kN; the first is that of rest. Of the pushed head
+    /// Load on the bottom at the end of a phase, kN; the first is that of rest. For the pushed head
     /// see the reactions.
     fn on_bottom(&self, phase: usize) -> f64 {
         let (mut pressure, mut force, mut level) = (0.0, 0.0, self.water);

@@ -1,5 +1,5 @@
-//! One input for each seed. `PILUM_RANDOM` says how many seeds of each family, in place of its own
-//! number; `PILUM_RANDOM_SEED` the first of them.
+//! One input for each seed. `PILUM_RANDOM` sets the number of seeds of every family;
+//! `PILUM_RANDOM_SEED` the first of them.
 #![expect(
     clippy::print_stderr,
     reason = "what a random test found is for its reader"
@@ -25,8 +25,8 @@ fn from_environment<T: FromStr>(name: &str) -> Option<T> {
     std::env::var(name).ok()?.parse().ok()
 }
 
-/// Checks `count` inputs of a family from seed `first` on. What fails is written to files; the first
-/// of it is made smaller. At least a quarter have to be done: input that is refused shows nothing.
+/// Checks `count` inputs of a family from seed `first` on. Failing inputs are written to files; the
+/// first is made smaller. At least a quarter have to run: input that is refused shows nothing.
 pub(crate) fn hold<S: Strategy>(
     family: &str,
     (first, count): (u64, u64),

@@ -1,7 +1,7 @@
 //! The page in a real browser: headless Chromium opens it with `?selftest`, the page tries itself
 //! out and writes the outcome at its end, and the browser prints the document.
 //!
-//! Where there is no browser the tests say so and do nothing, or fail (`tests::needs`).
+//! Without a browser the tests do nothing but print a remark, or fail (`tests::needs`).
 
 use crate::folders::folders;
 use serde_json::Value;

@@ -1,6 +1,6 @@
-//! What tests need besides cargo: compilers, a browser, programs of others. Without them a test says
-//! so and does nothing; where `PILUM_REQUIRE_ALL` or `CI` is set, as in `.ci/run`, it fails. The last of all test
-//! programs says in one line what was skipped (`tests/what_was_skipped.rs`).
+//! Requirements of tests besides cargo: compilers, a browser, programs of others. Without them a test does
+//! nothing but print a remark; if `PILUM_REQUIRE_ALL` or `CI` is set, as in `.ci/run`, it fails. The last of all
+//! test programs prints in one line what was skipped (`tests/what_was_skipped.rs`).
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io::{ErrorKind, Write};
@@ -38,8 +38,8 @@ pub fn passed_over(what: &str) {
     note(&test, what);
 }
 
-/// Where skipped tests are noted: a folder in cargo's `target/tmp` with a file for each process that starts test
-/// programs. A test program that a test starts has another one, which nobody reads.
+/// Folder of notes on skipped tests, in cargo's `target/tmp`, with a file for each process that starts test
+/// programs. A test program that a test starts has another file, which nobody reads.
 fn notes() -> Option<PathBuf> {
     let program = env::current_exe().ok()?;
     Some(program.ancestors().nth(3)?.join("tmp/skipped"))
@@ -68,7 +68,7 @@ fn note(test: &str, what: &str) {
     }
 }
 
-/// What was skipped since `cargo test` began, in one line; the notes are taken away.
+/// Summary, in one line, of tests skipped since `cargo test` began. Removes the notes.
 pub fn skipped() -> String {
     let folder = notes().unwrap_or_default();
     let notes = fs::read_to_string(folder.join(starter())).unwrap_or_default();
@@ -99,8 +99,8 @@ fn summary(notes: &str) -> String {
     )
 }
 
-/// What cargo prints where it may lack crates that nothing has fetched yet: it is asked without a network first, then
-/// with one. `None`, with a remark, if they are [`missing`].
+/// Output of cargo, which may lack crates that nothing has fetched yet: it runs without a network first, then with
+/// one. `None`, with a remark, if they are [`missing`].
 ///
 /// # Panics
 /// If it cannot be started, or crates are missing where nothing may be passed over.
@@ -128,7 +128,7 @@ pub fn signal(signal: &str, to: &str) -> bool {
     shell.output().is_ok_and(|output| output.status.success())
 }
 
-/// What a program puts out; `None`, with a remark, if it is [`missing`].
+/// Output of a program; `None`, with a remark, if it is [`missing`].
 ///
 /// # Panics
 /// If it cannot be started for another reason, or is missing where nothing may be passed over.
@@ -179,8 +179,8 @@ pub fn is_there(program: &str) -> bool {
     there
 }
 
-/// Runs one test of the present test program where no other program is found: it has to pass with a
-/// remark that names what is missing, and to fail with the same name where nothing may be passed over.
+/// Runs one test of the present test program where no other program is found. It has to pass with a
+/// remark that names what is missing, and to fail with the same name where nothing may be skipped.
 ///
 /// # Panics
 /// If it does not.

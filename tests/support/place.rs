@@ -44,7 +44,7 @@ pub struct Outcome {
 pub struct Place {
     /// Home and working folder are in it too.
     folder: TempDir,
-    /// Where `bin` and the others are.
+    /// Parent of `bin` and the others.
     pub prefix: PathBuf,
 }
 

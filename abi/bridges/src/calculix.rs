@@ -2,10 +2,10 @@
 //! named `@LIBRARY_CALCULIX`. (A material named `@ABAQUS_LIBRARY_UMAT` is called as in
 //! [`umat`](crate::umat).)
 //!
-//! Always three dimensions. Strains are tensor components, internal variables are in an array of
-//! the whole model, and the tangent is symmetric: of an unsymmetric one CalculiX gets the
-//! symmetric part, as its own interface to Abaqus' routines makes it. That slows the iteration of
-//! laws with non-associated flow and does not change the stress.
+//! Always three dimensions. Strains are tensor components. Internal variables are in an array of
+//! the whole model. CalculiX gets the symmetric part of an unsymmetric tangent, as its own
+//! interface to Abaqus' routines makes it. That slows the iteration of laws with non-associated
+//! flow and does not change the stress.
 
 use crate::laws::{Laws, Trouble, complain, offers};
 use crate::point::{Answer, Carried, Point};

@@ -25,9 +25,9 @@ pub use abi;
 /// `Joint`. A law that does not offer all of the hypotheses names those it offers, in MFront's
 /// words: `bridges::export!(continuum Layer in PlaneStrain Axisymmetrical);`.
 ///
-/// With the names of all material properties and parameters, in MFront's spelling and in their order,
-/// defaults and bounds are exported too; a name that does not fit is refused when the law is compiled:
-/// `bridges::export!(interface Joint, properties: [NormalStiffness], parameters: [Cohesion]);`.
+/// To export defaults and bounds too, list the names of all material properties and parameters, in
+/// their order and in MFront's spelling. A wrong name does not compile: `bridges::export!(interface
+/// Joint, properties: [NormalStiffness], parameters: [Cohesion]);`.
 ///
 /// A library holds one entry for user materials: with several laws for solids, name the one that
 /// it is for with [`export_umat!`](crate::export_umat), and export the behaviours of all of them with

@@ -1,16 +1,15 @@
 //! The entry of Abaqus user materials (`UMAT`), which many programs call.
 //!
-//! `PROPS` are the parameters in declared order; those at the end that have a default, or are
-//! optional, may be left out. `STATEV` are the internal variables in declared order. With `NTENS`
-//! 6 the law is called in three dimensions, with 4 in plane strain or axisymmetry: nothing in the call
-//! tells these two apart, and no law has to, since its update depends on the number of components only.
-//! Everything but `STRESS`, `DSTRAN`, `NTENS`, `PROPS` and `NPROPS` may be null; without `STATEV`
-//! only a law without internal variables can be called. `STATEV` that are all zero stand for the
-//! law's own initial values.
+//! `PROPS` are the parameters in declared order; those at the end that have a default, or are optional,
+//! may be left out. `STATEV` are the internal variables in declared order. With `NTENS` 6 the law is
+//! called in three dimensions, with 4 in plane strain or axisymmetry. The call does not tell these two
+//! apart. No law needs to, since its update depends only on the number of components. Everything but
+//! `STRESS`, `DSTRAN`, `NTENS`, `PROPS` and `NPROPS` may be null; without `STATEV` only a law without
+//! internal variables can be called. `STATEV` that are all zero stand for the law's own initial values.
 //!
-//! Where there is no answer, `STRESS` and `DDSDDE` become NaN, `STATEV` stays, and `PNEWDT` is the
-//! fraction of the increment that the law believes it can follow: a caller that ignores `PNEWDT`, or
-//! passes none, must not take the stress of the start for that of the end.
+//! If there is no answer, `STRESS` and `DDSDDE` become NaN, `STATEV` stays, and `PNEWDT` is the
+//! fraction of the increment that the law believes it can follow. A caller that ignores `PNEWDT`, or
+//! passes null, must not take the stress at the start for that at the end.
 
 use crate::laws::{Laws, Trouble, complain, offers};
 use crate::point::{Answer, Carried, Point};

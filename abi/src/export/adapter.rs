@@ -84,7 +84,8 @@ const NO_RATES: Failure = Failure::Numeric("the law offers no rates");
 /// Flags of what a law has for a consistent tangent.
 ///
 /// # Panics
-/// A law with `LINEAR` has none but a consistent one; at compile time, where it is exported.
+/// If a law with `LINEAR` has another tangent than the consistent one; at compile time, where it is
+/// exported.
 const fn flags_of_tangent(tangent: HasTangent, is_linear: bool) -> u32 {
     assert!(
         !is_linear || matches!(tangent, HasTangent::Consistent),

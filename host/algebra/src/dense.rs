@@ -178,8 +178,8 @@ pub(crate) fn solve(factors: &[f64], exchanges: &Exchanges, right: &[f64]) -> Ve
     x
 }
 
-/// Pivots of [`Factors`] that are smaller than this, as a fraction of the largest entry of the matrix, are taken for what
-/// rounding leaves of nothing.
+/// Pivots of [`Factors`] that are smaller than this, as a fraction of the largest entry of the matrix, are taken for
+/// what rounding leaves of nothing.
 const VANISHING: f64 = 1e-13;
 
 /// A small dense matrix, factorised.
@@ -191,10 +191,10 @@ pub struct Factors {
 }
 
 impl Factors {
-    /// Of a square matrix with `n` rows, column-major.
+    /// Factorises a square matrix with `n` rows, column-major.
     ///
     /// # Errors
-    /// [`Singular`], but for round-off.
+    /// [`Singular`], up to round-off.
     pub fn new(mut values: Vec<f64>, n: usize) -> Result<Self, Singular> {
         let least = VANISHING * largest(&values);
         let mut exchanges = Exchanges::default();

@@ -1,19 +1,17 @@
 //! Multifrontal factorisation of matrices whose pattern is symmetric, whatever their values.
 //!
-//! The equations are put in an order that keeps fill low and gathered in supernodes; what a
-//! supernode and its descendants leave to later equations is a dense update matrix. So all work is
-//! in dense kernels, a new matrix of the same pattern needs no new analysis, and branches of the
-//! tree of supernodes are independent of each other (Duff & Reid 1983; Liu 1992).
+//! The equations are put in an order that keeps fill low and gathered in supernodes. A supernode and its descendants
+//! pass a dense update matrix to later equations. So all work is in dense kernels, a new matrix of the same pattern
+//! needs no new analysis, and branches of the tree of supernodes are independent of each other (Duff & Reid 1983; Liu
+//! 1992).
 //!
-//! Some equations may be *kept*: they are not eliminated, and their Schur complement
-//! S = K_kk − K_ke K_ee⁻¹ K_ek is what the factorisation leaves behind. That is static
-//! condensation.
+//! Some equations may be *kept*: they are not eliminated, and the factorisation yields their Schur complement S = K_kk
+//! − K_ke K_ee⁻¹ K_ek. That is static condensation.
 //!
-//! A matrix that differs from the last one in some entries only costs the supernodes that eliminate
-//! them and those above; what the others leave is taken over, bit for bit. So a body pays for what
-//! yields, not for what stays elastic. What large supernodes leave is kept for it where [other matrices
-//! follow](Multifrontal::expect_others); what a small one leaves next to those that have changed is
-//! computed once more, with all below it, and kept until it changes itself.
+//! A matrix that differs from the last one in some entries only costs the supernodes that eliminate them and those
+//! above; updates of the others are reused, bit for bit. So only the yielding part of a body costs time. Large
+//! supernodes keep their updates if [other matrices follow](Multifrontal::expect_others). Small ones next to changed
+//! ones compute theirs once more, with all below, and keep it until they change themselves.
 //!
 //! Symmetric matrices are factorised as L Lᵀ and have to be positive definite; others as L U with
 //! row exchanges inside a supernode only. The caller checks the first solution by its residual and
@@ -115,7 +113,8 @@ impl Multifrontal {
         }
     }
 
-    /// Another factorisation of the same pattern, kind and order, for other matrices. Not of one that has been gathered.
+    /// Another factorisation of the same pattern, kind and order, for other matrices. Not of one that has been
+    /// gathered.
     #[must_use]
     pub fn alike(&self) -> Self {
         Self::of(Arc::clone(&self.analysis))

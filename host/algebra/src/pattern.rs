@@ -28,8 +28,8 @@ impl Pattern {
         (0..self.n()).map(of_column).collect()
     }
 
-    /// Pattern of `n` equations whose elements couple all of their own: of every element its degrees of
-    /// freedom, and the `equation` of a degree of freedom, if it has one.
+    /// Pattern of `n` equations. Each element couples all its degrees of freedom, which `elements` lists; `equation` is
+    /// that of a degree of freedom, if it has one.
     pub fn new<'a>(
         n: usize,
         equation: &[Option<usize>],

@@ -1,6 +1,6 @@
-//! The archive that is installed: which files of the repository and of what cargo has built go where.
-//! A folder is laid out as `/usr/local` is, so that it can be unpacked there, or anywhere: the program finds
-//! its laws by where it lies itself, pkg-config and CMake find the headers by where their files lie.
+//! The archive that is installed: which files of the repository and of cargo's output go where. Its layout
+//! is that of `/usr/local`; it can be unpacked there or anywhere else. The program finds its laws relative
+//! to itself; pkg-config and CMake find the headers relative to their files.
 //!
 //! ```text
 //! bin/pilum
@@ -47,22 +47,13 @@ impl Built {
 }
 
 /// A page, file or folder of the repository, and the folder that it goes to.
-const FILES: [(&str, &str); 17] = [
+const FILES: [(&str, &str); 15] = [
     ("abi/include/pilum_law.h", "include/pilum"),
     ("abi/include/pilum_point.h", "include/pilum"),
     ("abi/include/pilum_law.hpp", "include/pilum"),
     ("abi/include/pilum_law.f90", "share/pilum"),
     ("abi/include/exports.map", "share/pilum"),
     ("cases", "share/pilum/cases"),
-    // The user material of a case.
-    (
-        "tests/fixtures/umat/hypoplastic.f90",
-        "share/pilum/cases/shear_zone",
-    ),
-    (
-        "tests/fixtures/umat/hypoplasticity.inc",
-        "share/pilum/cases/shear_zone",
-    ),
     ("LICENSE-MIT", "share/doc/pilum"),
     ("LICENSE-APACHE", "share/doc/pilum"),
     ("CHANGELOG.md", "share/doc/pilum"),

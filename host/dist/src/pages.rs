@@ -8,7 +8,7 @@ use std::path::{Component, Path, PathBuf};
 /// Files of the repository, and where they lie in the archive; both are relative.
 pub(crate) type Places = BTreeMap<PathBuf, PathBuf>;
 
-/// Where cases lie; commands of pages are given in this folder, or where its `cases` were copied to.
+/// Folder of the cases. Commands of pages are run in it, or where its `cases` were copied to.
 pub(crate) const SHARED: &str = "share/pilum";
 
 /// The mark of a command that does not work outside of the repository.
@@ -59,7 +59,7 @@ fn command(line: &str, places: &Places) -> String {
     format!("{}{gap}{remark}", words.join(" "))
 }
 
-/// A line with its links. What the archive has not got leaves its text.
+/// A line with its links. A link to a file that the archive lacks becomes its text.
 fn links(line: &str, page: &Path, places: &Places, repository: &Path) -> String {
     let mut written = String::new();
     let mut rest = line;
@@ -104,7 +104,7 @@ fn without_bracket(text: &str) -> String {
     text.to_owned()
 }
 
-/// Where a file or folder of the repository is in the archive.
+/// Place in the archive of a file or folder of the repository.
 fn place(path: &Path, places: &Places) -> Option<PathBuf> {
     if let Some(place) = places.get(path) {
         return Some(place.clone());

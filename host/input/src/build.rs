@@ -1,16 +1,16 @@
 //! From a case file to a problem in memory and the results that are wanted of it; and back: which place
 //! of the file an error of the problem is about.
 
-mod spare;
+mod unused_laws;
 
-use self::spare::Look;
+use self::unused_laws::Look;
 use crate::case::{Case, CaseFile, GroupInput, LawInput, PhaseInput};
 use crate::ground::{LevelInput, ProfileInput, level};
 use crate::material::{
     LawTables, ParameterValue, ZONE, is_solid_at_interface, place_failure, try_law,
 };
 use crate::mesh::{self, Built, MeshFile};
-use crate::{Error, figures, idle, pile, probes};
+use crate::{Error, figures, ineffective_options, pile, probes};
 use abi::Hypothesis;
 use abi::status::Outcome;
 use indexmap::IndexMap;
@@ -25,7 +25,7 @@ use mechanics::problem::{
 use mechanics::settings::Control;
 use mechanics::simulation::Warning;
 use mechanics::{Simulation, model};
-use results::{About, Wanted};
+use results::{About, OutputRequest};
 use std::ops::Range;
 use std::sync::Arc;
 use text::{Source, suggestion};
@@ -220,9 +220,9 @@ impl Case {
     ///
     /// # Errors
     /// [`text::Error::Input`] at the probe or figure that does not fit.
-    pub fn wanted(&self, simulation: &Simulation) -> Result<Wanted, Error> {
+    pub fn wanted(&self, simulation: &Simulation) -> Result<OutputRequest, Error> {
         let probes = probes::resolve(self, simulation)?;
-        let mut wanted = Wanted {
+        let mut wanted = OutputRequest {
             output: self.file.output,
             probes,
             pile: pile::resolve(self, simulation)?,
@@ -271,7 +271,7 @@ impl Case {
         let mut warnings = probes::reactions(self, simulation.problem());
         warnings.extend(self.forgetful_swaps(simulation.problem()));
         warnings.extend(self.timeless_phases(simulation.problem()));
-        warnings.extend(idle::choices(self));
+        warnings.extend(ineffective_options::choices(self));
         warnings
     }
 

@@ -3,7 +3,7 @@
 use crate::case::MeasuredInput;
 use crate::material::ParameterValue;
 use crate::{Error, measured};
-use results::wanted::Measured;
+use results::output_request::Measured;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -218,17 +218,17 @@ pub struct CurveInput {
     /// A part of it that grows with the value measured.
     #[schemars(with = "Option<f64>", range(min = 0))]
     pub relative_noise: Option<Spanned<f64>>,
-    /// Slack, or a wrong zero: what every measured `x` has too much, looked for together with the parameters. Before its
-    /// start the computed curve then keeps its first value. 0 if left out.
+    /// Offset of every measured `x` (slack, or a wrong zero), fitted together with the parameters. Before its start the
+    /// computed curve then keeps its first value. 0 if left out.
     #[schemars(with = "Option<ReadingInput>")]
     pub offset_x: Option<Spanned<ReadingInput>>,
-    /// What every measured `x` is multiplied by, before the offset, looked for likewise. 1 if left out.
+    /// Factor on every measured `x`, applied before the offset; fitted likewise. 1 if left out.
     #[schemars(with = "Option<ReadingInput>")]
     pub scale_x: Option<Spanned<ReadingInput>>,
-    /// What every measured `y` has too much, looked for likewise. 0 if left out.
+    /// Offset of every measured `y`, fitted likewise. 0 if left out.
     #[schemars(with = "Option<ReadingInput>")]
     pub offset_y: Option<Spanned<ReadingInput>>,
-    /// What every measured `y` is multiplied by, before the offset, looked for likewise. 1 if left out.
+    /// Factor on every measured `y`, applied before the offset; fitted likewise. 1 if left out.
     #[schemars(with = "Option<ReadingInput>")]
     pub scale_y: Option<Spanned<ReadingInput>>,
     /// How much its squared residuals count. It moves the values found, and is no information: equal weights change
@@ -251,7 +251,7 @@ pub struct ReadingInput {
 }
 
 impl CurveInput {
-    /// What is looked for of how it was read: its key, what it is where it is left out, what is given.
+    /// Offsets and scales that may be fitted: key, value if left out, input.
     pub fn readings(&self) -> [(&'static str, f64, Option<&Spanned<ReadingInput>>); 4] {
         [
             ("offset_x", 0.0, self.offset_x.as_ref()),

@@ -1,7 +1,7 @@
 //! The case file: what a user writes, key by key. Reading it gives these types; references
 //! between them (a group's law, a load's line) are resolved by the modules that use them.
 
-use crate::chosen::Chosen;
+use crate::accuracy_settings::AccuracySettings;
 use crate::ground::{ProfileInput, StressInput, WaterChange, WaterInput};
 use crate::material::{ForeignKeys, ParameterTable, ParameterValue, Route, shear_zone};
 use crate::{Error, schema};
@@ -10,7 +10,7 @@ use law::ShearZone;
 use law::adapter::{Externals, Foreign, Order, Scratch};
 use mechanics::Settings;
 use mechanics::problem::{self, Analysis, Drainage, Formulation, InPlane, Integration};
-use results::wanted::{Output, Reduce};
+use results::output_request::{Output, Reduce};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, de};
 use std::borrow::Cow;
@@ -201,7 +201,7 @@ pub struct CaseFile {
     pub accuracy_with_mesh: Option<Spanned<bool>>,
     /// The settings that such a study chose.
     #[serde(skip)]
-    pub chosen: Option<Chosen>,
+    pub chosen: Option<AccuracySettings>,
 }
 
 impl CaseFile {
@@ -637,8 +637,8 @@ pub struct ProbeInput {
     /// Over the integration points of this group; with a line, only its forces.
     #[schemars(with = "Option<String>")]
     pub group: Option<Spanned<String>>,
-    /// What: of a line `displacement_…`, `reaction_…`, with a group `force_…`; of a group a stress, strain,
-    /// traction, jump or internal variable, and where there is water or undrained ground `pore_pressure`,
+    /// On a line: `displacement_…`, `reaction_…`, with a group `force_…`. In a group: a stress, strain,
+    /// traction, jump or internal variable; with water or undrained ground also `pore_pressure`,
     /// `excess_pore_pressure` (compression positive) and `total_stress_…`, kPa.
     #[schemars(with = "Option<String>")]
     pub quantity: Option<Spanned<String>>,
@@ -666,7 +666,7 @@ pub struct PileInput {
     pub group: GroupNames,
     /// Interface groups along its shaft, from the head to the toe.
     pub shaft: GroupNames,
-    /// What is under its base: an interface group, or a line along which it is on the ground.
+    /// Support of its base: an interface group, or the line along which it rests on the ground.
     #[schemars(with = "String")]
     pub base: Spanned<String>,
     /// The line of its head.

@@ -1,6 +1,6 @@
 //! The driver file: reading it, and checking everything that can be checked before the first call.
 //!
-//! What a driver is and does is [`point`]'s; here is where in a file it stands.
+//! [`point`] defines what a driver does; this module locates it in a file.
 
 mod path;
 
@@ -14,8 +14,8 @@ use law::adapter::{Externals, Order, Scratch};
 use law::{BuiltLaw, LoadedLaw, Opener, Pins, SearchPath};
 use path::{finite, hypothesis, initial_flux, segments};
 use point::{Segment, Vector};
+use results::output_request::Figure;
 use results::point_figure::drawable;
-use results::wanted::Figure;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -43,7 +43,8 @@ pub(crate) struct DriverFile {
     /// SHA-256 of the law's library; another one is refused.
     #[schemars(with = "Option<String>")]
     sha256: Option<Spanned<String>>,
-    /// What the law's library is made for, if not for the contract; or that it is made from another law.
+    /// Program that the law's library is made for, if not for the contract; or another law as its
+    /// source.
     #[schemars(with = "Option<Route>")]
     adapter: Option<Spanned<Route>>,
     /// That library.

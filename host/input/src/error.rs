@@ -3,7 +3,7 @@
 use law::Stopped;
 use mechanics::NoEquilibrium;
 use mechanics::equilibrium::{Iterations, Mechanism, Reason, Singularity};
-use mechanics::group::Gives;
+use mechanics::group::FailureMode;
 use mechanics::settings::Control;
 use text::{InputError, add_hint};
 use thiserror::Error;
@@ -156,11 +156,11 @@ fn after_no_equilibrium(none: &NoEquilibrium) -> String {
 /// What keeps a bond that breaks at once and leaves no equilibrium.
 fn remedy(mechanism: &Mechanism) -> Option<&'static str> {
     match mechanism.how {
-        Gives::BondBreaks | Gives::Opens if mechanism.is_bare => Some(
+        FailureMode::BondBreaks | FailureMode::Opens if mechanism.is_bare => Some(
             "a normal stress to begin with (initial stresses, or a phase of weight or pressure before), or a tensile strength, \
              keeps the bond; without cohesion there is none to break",
         ),
-        Gives::BondBreaks => Some(
+        FailureMode::BondBreaks => Some(
             "a bond that breaks at once may leave nothing that carries the load: prescribe a displacement instead, or give the \
              law a tensile strength",
         ),
@@ -181,7 +181,7 @@ fn may_have_another_way(reason: &Reason) -> bool {
     }
 }
 
-/// Who has to act.
+/// The one who has to act.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Whoever wrote the input; places that cannot be read or written included.
@@ -262,7 +262,7 @@ impl Error {
         }
     }
 
-    /// Who has to act.
+    /// The one who has to act.
     pub fn kind(&self) -> Kind {
         use abi::status::Outcome;
         match self {

@@ -2,8 +2,8 @@
 
 use crate::case::{Case, CutInput, FigureInput};
 use crate::{Error, measured};
+use results::output_request::{Cut, Figure};
 use results::pile::OF_STATION;
-use results::wanted::{Cut, Figure};
 use text::{Source, suggestion};
 use toml::Spanned;
 

@@ -37,7 +37,7 @@ impl ProfileInput {
     /// The profile it stands for.
     ///
     /// # Errors
-    /// [`text::Error::Input`] where heights do not rise, or a number is none.
+    /// [`text::Error::Input`] if heights do not rise, or a number is not finite.
     pub(crate) fn read(&self, source: &Source, at: Range<usize>) -> Result<Profile, Error> {
         let points = match self {
             Self::Number(value) => vec![[0.0, *value]],
@@ -105,7 +105,7 @@ impl WaterInput {
     /// The water it stands for.
     ///
     /// # Errors
-    /// [`text::Error::Input`] where the level is none.
+    /// [`text::Error::Input`] if the level is not valid.
     pub(crate) fn read(&self, source: &Source) -> Result<Water, Error> {
         Ok(Water {
             level: level(source, &self.level)?,
@@ -159,7 +159,7 @@ impl StressInput {
     /// The stress it stands for; `at`: where it is written.
     ///
     /// # Errors
-    /// [`text::Error::Input`] where keys do not go together, or a profile is none.
+    /// [`text::Error::Input`] if keys do not go together, or a profile is not valid.
     pub(crate) fn read(&self, source: &Source, at: Range<usize>) -> Result<InitialStress, Error> {
         let components = [&self.s11, &self.s22, &self.s33, &self.s12];
         let profile = |input: &Spanned<ProfileInput>| input.get_ref().read(source, input.span());

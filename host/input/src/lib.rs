@@ -1,18 +1,18 @@
 //! Files that pose something to compute, and back: a case becomes a problem, a driver a path of one law,
 //! and what is wrong with either is reported at its place in the file.
 
+pub mod accuracy_settings;
 pub mod build;
 pub mod calibration;
 pub mod case;
-pub mod chosen;
 pub mod driver;
 mod error;
 pub mod figures;
 pub mod gmsh;
 mod grid;
 pub mod ground;
-mod idle;
 pub mod incremental_driver;
+mod ineffective_options;
 pub mod lock;
 pub mod material;
 mod measured;

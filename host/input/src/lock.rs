@@ -1,4 +1,4 @@
-//! Libraries that a case was made with: `sha256` next to a law in the file, and a lock file beside
+//! Libraries that a case was made with: `sha256` next to a law in the file, and a lock file next to
 //! the case.
 //!
 //! A lock lists every law that the case uses. It is honoured wherever it stands: a case with

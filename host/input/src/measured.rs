@@ -3,7 +3,7 @@
 use crate::Error;
 use crate::case::MeasuredInput;
 use csv::{ByteRecord, Reader, ReaderBuilder};
-use results::wanted::Measured;
+use results::output_request::Measured;
 use std::path::Path;
 use text::file::read_text;
 use text::{Source, suggestion};
@@ -15,8 +15,8 @@ const MOST_POINTS: usize = 20_000;
 /// Reads the points of a table.
 ///
 /// # Errors
-/// [`text::Error::Input`] at the key that does not fit: the file cannot be read, a column is not
-/// there, a cell is no number, there are no points or too many.
+/// [`text::Error::Input`] at the key that does not fit: the file cannot be read, a column is
+/// missing, a cell is not a number, there are no points or too many.
 pub(crate) fn read(source: &Source, input: &MeasuredInput) -> Result<Measured, Error> {
     let case = source.path_at(&input.file.span());
     let path = case

@@ -27,8 +27,8 @@ pub struct MeshFile {
     pub sha256: String,
     /// What the user should know of it.
     pub notes: Vec<String>,
-    /// Of the mesh's first nodes the place in the file, from 0: of all that elements of the case have. Those that
-    /// divisions and interfaces make come behind them.
+    /// Places in the file, from 0, of the mesh's first nodes: all that elements of the case have. Nodes made by
+    /// divisions and interfaces come after them.
     pub kept: Vec<usize>,
 }
 
@@ -160,8 +160,8 @@ fn words<'n>(cannot: &CannotInsert, group: impl Fn(usize) -> &'n str) -> String 
 }
 
 /// Nodes of every line, after all splitting, in the order of the coordinates: those of the elements
-/// that have a side on it. So a line that ends at another one, along which nodes are doubled, has
-/// those of its own side.
+/// that have a side on it. So where a line ends at another one with doubled nodes, it has those on
+/// its side.
 fn collect_line_nodes(mesh: &mut Mesh) {
     let mut lines = std::mem::take(&mut mesh.lines);
     for line in lines.values_mut() {

@@ -10,9 +10,9 @@ use mechanics::mesh::Mesh;
 use mechanics::problem::Formulation;
 use mechanics::settings::Control;
 use mechanics::{Place, Simulation};
+use results::output_request::Reduce;
 use results::pressures::Pressure;
 use results::probe::{PointQuantity, Probe, Probes, section};
-use results::wanted::Reduce;
 use std::collections::HashSet;
 use text::{Named, Source, suggestion};
 use toml::Spanned;
@@ -373,8 +373,8 @@ impl Resolver<'_> {
         })
     }
 
-    /// Whether a point lies strictly inside the extents. What is weighted counts, on their edge, if its
-    /// element lies inside: points of adjoining extents then count once.
+    /// Whether a point lies strictly inside the extents. Weighted points on their edge count if the
+    /// element lies inside: a point between adjoining extents then counts once.
     fn counts(&self, group: &Group, point: usize) -> bool {
         let position = group.kinematics.position(point);
         if self.inside(position) {

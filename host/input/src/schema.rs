@@ -1,8 +1,8 @@
 //! JSON Schemas of case, driver and study files and calibrations, for editors: derived from the types that read them.
 //!
 //! `base` and `[[variant]]` are merged before anything is read, so a file with one of them may leave
-//! out what the other file says: the top level of a schema admits parts, and demands a complete file
-//! only where there is neither.
+//! out what the other file says. The top level of a schema therefore admits parts, and demands a
+//! complete file only if both are absent.
 
 use crate::calibration::CalibrationFile;
 use crate::case::CaseFile;
@@ -183,7 +183,7 @@ pub(crate) fn components_alone(schema: &mut Schema) {
     }
 }
 
-/// `z` beside `y` for the height.
+/// `y` as another name of `z`, the height.
 pub(crate) fn height(schema: &mut Schema) {
     let Some(properties) = schema.get_mut("properties").and_then(Value::as_object_mut) else {
         return;

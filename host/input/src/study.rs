@@ -42,8 +42,8 @@ pub struct StudyFile {
     pub variant: Option<Spanned<String>>,
     /// How the values of the runs are chosen.
     pub method: Method,
-    /// How many runs: of `latin_hypercube` and `sobol`. Of `saltelli` how many base points: each is two
-    /// runs more than there are parameters.
+    /// Number of runs of `latin_hypercube` and `sobol`. For `saltelli` the number of base points: each
+    /// is two runs more than there are parameters.
     #[schemars(with = "Option<usize>", extend("minimum" = 1))]
     pub runs: Option<Spanned<usize>>,
     /// What random numbers begin with; the same seed gives the same runs. 0 if left out.

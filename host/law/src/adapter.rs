@@ -21,8 +21,8 @@ mod umat;
 pub use umat::SYMBOLS as UMAT_SYMBOLS;
 
 use super::description::LawDescription;
-use super::image::Image;
 use super::library::{Call, CallFailure, Strided};
+use super::library_bytes::Image;
 use super::{Moment, Site};
 use crate::Error;
 use abi::Hypothesis;

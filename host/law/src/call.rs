@@ -86,7 +86,7 @@ pub struct Start<'a> {
     pub time: f64,
     /// Time increment.
     pub time_increment: f64,
-    /// Which step and increment it is.
+    /// Numbers of the step and the increment.
     pub moment: Moment,
     /// Coordinates of the points; empty if the law does not ask ([`crate::Law::asks_for_sites`]).
     pub sites: &'a [Site],
@@ -177,7 +177,7 @@ pub struct PointCall {
     pub flux: Vec<f64>,
     /// Internal variables at the start.
     pub state: Vec<f64>,
-    /// Which step and increment it is.
+    /// Numbers of the step and the increment.
     pub moment: Moment,
     /// Where the point lies.
     pub site: Site,

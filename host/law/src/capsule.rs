@@ -9,7 +9,7 @@ use crate::Error;
 use crate::FormulationDescription;
 use crate::adapter::{Adapter, Externals, Foreign, Order};
 use crate::description::words;
-use crate::library::probe::kept::Function;
+use crate::library::probe::call_log::Function;
 use crate::library::probe::{Form, PointStart};
 use crate::{BatchFailure, Law, LoadedLaw, Moment, Operator, PointCall, Request, ShearZone, Site};
 use abi::Hypothesis;
@@ -191,9 +191,9 @@ const REQUESTS: [(&str, Request); 4] = [
     ("initial state", Request::InitialState),
 ];
 
-/// What `create` is asked for.
+/// Name in files of the request to `create`.
 const CREATE: &str = "an instance";
-/// What `destroy` is asked for.
+/// Name in files of the request to `destroy`.
 const DESTROY: &str = "the end of an instance";
 
 /// The name of a request in files.
@@ -766,8 +766,8 @@ impl std::fmt::Display for Capsule {
     }
 }
 
-/// Where the value under these keys stands, or else the last of the keys that is there; of a whole
-/// table its head.
+/// Place of the value under these keys, or else of the last key that exists; for a whole table, of
+/// its head.
 fn place(text: &str, keys: &[&str]) -> Range<usize> {
     let mut at = 0..0;
     let Ok(root) = DeTable::parse(text) else {

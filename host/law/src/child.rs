@@ -94,9 +94,9 @@ fn signal_name(number: i32) -> Option<&'static str> {
 // Of the whole process: where its program lies never changes.
 static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
 
-/// Has this program be started where a child is needed, and its folders be those of the program's own
-/// laws: for a process that is not the program, such as an interpreter that has loaded its rooms. The
-/// first one that is named counts.
+/// Names the program to start as a child, whose folders hold the program's own laws. It is for a
+/// process that is not the program, such as an interpreter that has loaded its rooms. The first name
+/// counts.
 pub fn stands_for(program: PathBuf) {
     let _ = PROGRAM.set(program);
 }
@@ -307,8 +307,8 @@ pub fn requests() -> nix::sys::signal::SigSet {
         .collect()
 }
 
-/// Has a file that may not grow any more (a limit of the user's) be a full disk, not a signal that
-/// ends the process; for threads and processes that are started from now on, too.
+/// Makes the user's limit on file size act like a full disk, not as a signal that ends the process.
+/// Threads and processes started later inherit this.
 #[cfg(unix)]
 pub fn ignore_file_limit() {
     use nix::sys::signal::{SigSet, Signal};

@@ -124,7 +124,7 @@ pub enum Tangent {
     Consistent,
     /// They are near them, such as elastic ones: Newton's method gains nothing by renewing them.
     Approximate,
-    /// There are none: where one is wanted, the elastic operator is in.
+    /// The law gives none: where one is wanted, the elastic operator takes its place.
     None,
 }
 

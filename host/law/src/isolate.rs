@@ -1,9 +1,9 @@
 //! Laws in worker processes: what crashes, exits or never returns does so there.
 //!
-//! A worker is this program again, with one law and its parameters. Host and worker take turns:
-//! the host writes a batch into shared memory and its size into a socket; the worker calls the
-//! law, writes the results into the memory and the outcome into the socket. A worker that is gone
-//! closes the socket. Each thread that calls at the same time has its own worker.
+//! A worker is this program again, with one law and its parameters. Host and worker take turns. The
+//! host writes a batch into shared memory and its size into a socket. The worker calls the law,
+//! writes the results into the memory and the outcome into the socket. A worker that is gone closes
+//! the socket. Each thread that calls at the same time has its own worker.
 //!
 //! | words of the memory | |
 //! |---|---|
@@ -19,7 +19,7 @@ use super::library::{Call, SharedMemory, Strided, abaqus};
 use crate::Error;
 use crate::child::{self, Ending};
 use crate::law::LawInstance;
-use crate::opened::Origin;
+use crate::open_library::Origin;
 use crate::{Library, Moment, Opener, Site};
 use abi::Hypothesis;
 use abi::raw::{self, Status};
@@ -872,7 +872,7 @@ impl Bench {
     }
 }
 
-/// What is reported of a law that forks.
+/// Report on a law that forks.
 const COPIED: &str = "the law made a copy of its process (fork)";
 
 /// Whether a law has made a copy of this process. The copy ends here: it must not answer, too.

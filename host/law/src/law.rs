@@ -1,7 +1,7 @@
 //! A law with its parameters, as elements call it.
 
 use crate::adapter::ForeignInstance;
-use crate::calls::{self, Doing};
+use crate::current_call::{self, Doing};
 #[cfg(unix)]
 use crate::isolate;
 use crate::library::{Call, OwnedInstance, Strided};
@@ -184,9 +184,9 @@ impl Law {
         })
     }
 
-    /// Whether a failure that no smaller step helps is trouble with the library, and not a limit of
-    /// what the law can follow: numbers that are not finite under a claim of success, which is all
-    /// that is numeric about routines made for other programs.
+    /// Whether a failure that no smaller step helps is a fault of the library, not a limit of what
+    /// the law can follow: values that are not finite although success is claimed. Every numeric
+    /// failure of a routine made for another program is of this kind.
     pub fn breaks_down(&self, failure: &BatchFailure) -> bool {
         let is_foreign = self.library().foreign().is_some();
         failure.outcome == Outcome::Numeric && (is_foreign || failure.claims_success)
@@ -258,9 +258,10 @@ impl Law {
             status: &mut status,
             step_factor: &mut factor,
         };
-        let result = calls::calling(self.name, Doing::Start, n_points, Moment::default(), || {
-            self.instance.init_state(call)
-        });
+        let result =
+            current_call::calling(self.name, Doing::Start, n_points, Moment::default(), || {
+                self.instance.init_state(call)
+            });
         match result {
             None => Ok(state),
             Some((worst, message)) => {
@@ -397,7 +398,7 @@ impl Law {
             step_factor: &mut *factor,
         };
         let update = || self.instance.integrate(call);
-        let (worst, message) = calls::calling(
+        let (worst, message) = current_call::calling(
             self.name,
             Doing::Update,
             start.n_points,

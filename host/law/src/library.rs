@@ -27,15 +27,15 @@ pub use instance::Strided;
 #[cfg(unix)]
 pub use shared::SharedMemory;
 
-use super::custody;
 use super::description::LawDescription;
-use super::image::Image;
+use super::library_bytes::Image;
+use super::process_state;
 use abi::raw::{self, Host, Law, MagicBlock};
 use abi::version::{self, PLUGIN_SIZE_1_0};
 use describe::{describe, known};
 pub(crate) use instance::{Call, CallFailure, OwnedInstance};
 use instance::{NOTHING, NOWHERE};
-use probe::kept::{self, KeptPhase, Phase};
+use probe::call_log::{self, KeptPhase, Phase};
 use std::ffi::CStr;
 use std::hint::black_box;
 use std::mem::size_of;
@@ -105,8 +105,9 @@ pub(crate) fn open(path: &Path, image: Image) -> Result<OpenLibrary, String> {
 
 fn load_and_describe(path: &Path, image: Image) -> Result<OpenLibrary, String> {
     let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
-    let begin =
-        |phase| kept::keep_phase(KeptPhase::new(phase, false)).map_err(|error| error.to_string());
+    let begin = |phase| {
+        call_log::keep_phase(KeptPhase::new(phase, false)).map_err(|error| error.to_string())
+    };
     begin(Phase::Load)?;
     // SAFETY: running the library's initialisers is what loading means; the user named it.
     let library: &'static libloading::Library =
@@ -138,9 +139,9 @@ fn load_and_describe(path: &Path, image: Image) -> Result<OpenLibrary, String> {
     describe(&plugin)
 }
 
-/// Loads the hashed bytes. Where that fails (a library that looks for others next to itself, a
-/// system that executes nothing from memory), the file is loaded, if it is still the same: the
-/// loader runs nothing of a library it cannot load.
+/// Loads the hashed bytes. If that fails (a library that looks for others next to itself, a system
+/// that executes nothing from memory), the file is loaded, provided it is unchanged. The loader
+/// runs nothing of a library it cannot load.
 ///
 /// # Safety
 /// The library's initialisers may be run.
@@ -181,14 +182,14 @@ unsafe fn load(file: &Path, path: &Path) -> Result<libloading::Library, libloadi
 /// Stack of the thread in which initialisers run: as large as that of a main thread.
 const STACK: usize = 8 << 20;
 
-/// Opens the library at `path` in its own thread. What its initialisers do to the arithmetic of their thread, as
-/// those that `-Ofast` links do, ends with that thread. Where there can be none it is opened in this one.
+/// Opens the library at `path` in its own thread. Changes that its initialisers make to the arithmetic of their
+/// thread, as those of `-Ofast` do, end with that thread. If no thread can be started, it is opened in this one.
 fn apart<T: Send>(path: &Path, open: impl Fn() -> T + Sync) -> T {
     let watched = || {
         let did_flush = flushes();
         let opened = open();
         if flushes() && !did_flush {
-            custody::remark(format!(
+            process_state::remark(format!(
                 "library {} has the thread that opens it take numbers below 2.2e-308 for zero, as `-Ofast` and \
                  `-ffast-math` link it; it was opened in a thread of its own, so that the program still computes with \
                  them",

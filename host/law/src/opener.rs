@@ -1,11 +1,11 @@
 //! Opening libraries: whom to trust, what to record, what is open already.
 
 use crate::adapter::{self, Adapter, Foreign, ForeignLaw};
-use crate::image::Image;
 #[cfg(unix)]
 use crate::isolate;
-use crate::opened::Origin;
-use crate::{Error, LawDescription, Library, Trust, child, library, vetting};
+use crate::library_bytes::Image;
+use crate::open_library::Origin;
+use crate::{Error, LawDescription, Library, Trust, child, library, trial};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::SystemTime;
@@ -121,7 +121,7 @@ impl Opener {
             return isolate::describe(path, &image.sha256, None).map_err(unusable);
         }
         if trust.probe {
-            vetting::vet(path, &image.sha256)?;
+            trial::vet(path, &image.sha256)?;
         }
         let laws = library::open(path, image).map_err(unusable)?.laws;
         let here = |(law, handle)| (law, Origin::Here(handle));

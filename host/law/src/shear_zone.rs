@@ -14,7 +14,7 @@
 use crate::description::{FormulationDescription, InternalVariable, LawDescription};
 use crate::law::LawInstance;
 use crate::library::{Call, CallFailure, Strided};
-use crate::opened::Origin;
+use crate::open_library::Origin;
 use crate::{Library, LoadedLaw};
 use abi::Hypothesis;
 use abi::raw::{self, Status};

@@ -24,7 +24,7 @@ pub struct Stop(Option<Arc<Inner>>);
 
 struct Inner {
     asked: Box<dyn Fn() -> bool + Send + Sync>,
-    /// What is told of the time since it last was.
+    /// Receives the duration of a piece of work that was not to be interrupted.
     beat: Box<dyn Fn(Duration) + Send + Sync>,
     /// When the request was first seen.
     since: OnceLock<Instant>,
@@ -49,8 +49,8 @@ impl Stop {
         Self::asked_by(move || flag.load(Ordering::Relaxed), |_| {})
     }
 
-    /// Asked as soon as `asked` reports it, which is called very often. `beat` is told how long every
-    /// piece of work took that was not to be interrupted.
+    /// Asked as soon as `asked` reports it, which is called very often. `beat` receives the duration
+    /// of every piece of work that was not to be interrupted.
     pub fn asked_by(
         asked: impl Fn() -> bool + Send + Sync + 'static,
         beat: impl Fn(Duration) + Send + Sync + 'static,
@@ -78,7 +78,7 @@ impl Stop {
         self.is_asked() && inner.since.get().is_some_and(|at| at.elapsed() >= GRACE)
     }
 
-    /// Tells how long work took that was not to be interrupted.
+    /// Reports how long work took that was not to be interrupted.
     pub fn beat(&self, took: Duration) {
         if let Some(inner) = &self.0 {
             (inner.beat)(took);

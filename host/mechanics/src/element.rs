@@ -152,8 +152,8 @@ pub trait Kinematics: std::fmt::Debug + Send + Sync {
     fn add_gradients(&self, displacement: &[f64], out: &mut [f64]);
     /// Adds the nodal forces that balance the stresses (tractions) of all points to `force`.
     fn add_forces(&self, flux: &[f64], force: &mut [f64]);
-    /// Tractions at the points of an element whose nodal forces are those of a traction (normal, tangential, by place and
-    /// axes there), integrated exactly. `None` where the points integrate whatever is linear exactly, or no such
+    /// Tractions at the points of an element whose nodal forces are those of a traction (normal, tangential, by place
+    /// and axes there), integrated exactly. `None` where the points integrate whatever is linear exactly, or no such
     /// tractions can be found.
     fn gathered(&self, _element: usize, _traction: Traction<'_>) -> Option<Vec<[f64; 2]>> {
         None

@@ -1,12 +1,12 @@
 //! Finding equilibrium: Newton iterations within a step, the sparse equations they solve, and the
 //! linear part of a model that takes no part in them.
 
+mod condensation;
 mod diagnosis;
-mod linear_domain;
 mod mechanism;
 mod newton;
 
-pub use linear_domain::{Held, LinearDomain, LookedAt, Reuse, Standing};
+pub use condensation::{CheckedPoints, Held, LinearDomain, Reuse, Standing};
 pub use mechanism::Mechanism;
 pub use newton::{
     Clock, Costs, Criterion, Culprit, DomainFailure, Guess, Imbalance, Iteration, Iterations,

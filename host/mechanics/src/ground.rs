@@ -8,13 +8,13 @@
 //! Weights, pore pressures and the water's pressure on the outline are nodal forces of a state
 //! ([`Loading`]); between two states they change in proportion to the phase's course.
 
-mod acting;
-mod column;
+mod body_forces;
 mod initial;
 mod loading;
+mod overburden;
 
-pub use acting::Acting;
-pub use column::Columns;
+pub use body_forces::Acting;
 pub(crate) use initial::{InitialStresses, beside_joints};
 pub(crate) use loading::unit_pressure;
 pub use loading::{Loading, pressure_on};
+pub use overburden::Columns;

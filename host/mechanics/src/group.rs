@@ -3,46 +3,46 @@
 //! An increment starts from the committed state; every iteration computes the trial state from it,
 //! so a failed increment leaves nothing behind.
 
-mod aside;
 mod breaks;
-mod carry;
+mod broken_bonds;
 mod correction;
+mod depth_profile;
 mod differences;
-mod excerpt;
-mod gives;
-mod joined;
+mod failure_mode;
+mod integrate;
+mod law_start;
 mod layer;
-mod look;
 mod operator;
+mod point_tangent;
+mod probed_elements;
+mod saved_state;
 mod state;
-mod takeover;
-mod tangent;
-mod torn;
-mod varying;
+mod tangent_check;
+mod tied_faces;
 mod water;
 
 pub use differences::{Origin, Reason as MadeBy};
-pub use excerpt::Excerpted;
-pub use gives::Gives;
-pub use joined::joined;
-pub use look::{Deviation, Notice, Went};
+pub use failure_mode::FailureMode;
+pub use point_tangent::Fault;
+pub use probed_elements::Excerpted;
 pub use state::GroupState;
-pub use tangent::Fault;
+pub use tangent_check::{Deviation, Notice, Went};
+pub use tied_faces::tied_nodes;
 
 use crate::element::Kinematics;
 use crate::problem::{Formulation, InPlane, Material};
 use abi::status::Outcome;
 use algebra::threads;
-pub use aside::Aside;
+use broken_bonds::Bond;
+pub use broken_bonds::BrokenBond;
+use depth_profile::Varying;
 use law::Law;
-use law::{BatchFailure, BatchSuccess, End, Moment, Operator, Site, Start, Strided, calls};
+use law::{BatchFailure, BatchSuccess, End, Moment, Operator, Site, Start, Strided, current_call};
+pub use law_start::LawStart;
 use layer::Layer;
+pub use saved_state::Aside;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
-pub use takeover::TakeOver;
-use torn::Bond;
-pub use torn::Torn;
-use varying::Varying;
 use water::Pores;
 
 /// Components of the strain (jump) that a linear law is tried with, and what its stress may be off
@@ -172,7 +172,7 @@ impl std::fmt::Display for PointFailure {
 /// Faces of an interface that stand apart, or touch without stress, as another law takes over, which
 /// is not told of gaps.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Parted {
+pub struct GroupSplit {
     /// Name of the group.
     pub group: String,
     /// Names of the two laws in the case file.
@@ -185,7 +185,7 @@ pub struct Parted {
     pub opening: f64,
 }
 
-impl std::fmt::Display for Parted {
+impl std::fmt::Display for GroupSplit {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self {
             group,
@@ -223,8 +223,8 @@ pub struct Group {
     pub strain: Field,
     /// Stresses (zero thickness: tractions) in axes of the elements.
     pub stress: Field,
-    /// What exact integration adds to the tractions that an interface began with, point by point; empty where that is
-    /// nothing. Elements carry it next to the law's answer, so that ground at rest stays at rest.
+    /// Exactly integrated tractions that an interface began with, less those at its points; empty if equal. Elements
+    /// carry the difference next to the law's answer, so that ground at rest stays at rest.
     correction: Vec<f64>,
     /// Internal variables of the law.
     pub internal: Field,
@@ -234,7 +234,7 @@ pub struct Group {
     pub moment: Moment,
     /// Calls of the laws used so far; the last one is that of the current law.
     pub law_calls: Vec<LawCalls>,
-    /// It is there: it has stiffness, weight and stress.
+    /// It has stiffness, weight and stress.
     pub is_active: bool,
     layer: Option<Layer>,
     /// Pore water that follows the deformation, if it does or did.
@@ -250,8 +250,7 @@ pub struct Group {
     tangents_are_constant: bool,
     /// Where tangents come from.
     origin: Origin,
-    /// The trial state is what the law, which starts now, makes of the committed one over a nil
-    /// increment.
+    /// The trial state is the answer of the law, which starts now, to the committed one over a zero increment.
     is_asked: bool,
     /// What its law started as.
     bond: Bond,
@@ -311,7 +310,7 @@ impl Group {
     ///
     /// # Errors
     /// The law cannot start from the stress.
-    pub fn set_law(&mut self, law: Material) -> Result<Option<Parted>, PointFailure> {
+    pub fn set_law(&mut self, law: Material) -> Result<Option<GroupSplit>, PointFailure> {
         let [old, new] = [&self.law, &law].map(|material| &material.built.law);
         let same = new.description().id == old.description().id;
         let kept = same && new.cannot_go_on_from(old).is_none();
@@ -322,7 +321,7 @@ impl Group {
     }
 
     /// Points of an interface that have moved and carry nothing.
-    fn parted(&self, law: &Material) -> Option<Parted> {
+    fn parted(&self, law: &Material) -> Option<GroupSplit> {
         let old = &self.law.built.law;
         if !self.is_active || old.n_components() != 2 {
             return None;
@@ -342,7 +341,7 @@ impl Group {
         let points: Vec<usize> = (0..all).filter(|&point| is_parted(point)).collect();
         let first = *points.first()?;
         let widest = points.iter().map(|&point| jumps[2 * point]);
-        Some(Parted {
+        Some(GroupSplit {
             group: self.name.clone(),
             laws: [self.law.name.clone(), law.name.clone()],
             points: [points.len(), all],
@@ -378,7 +377,7 @@ impl Group {
         self.forget_trial();
         self.law = law;
         self.origin = Origin::default();
-        self.watched = calls::name(&format!("group `{}`", self.name));
+        self.watched = current_call::name(&format!("group `{}`", self.name));
         let law = &self.law.built.law;
         let name = &self.law.name;
         if self.law_calls.last().is_none_or(|calls| calls.law != *name) {
@@ -446,7 +445,7 @@ impl Group {
     /// Stresses that the law returns before any deformation.
     fn initial_state(&self) -> Result<Vec<f64>, PointFailure> {
         let place = self.flux_place();
-        calls::of_group(self.watched, 0, self.kinematics.points_of(0).len());
+        current_call::of_group(self.watched, 0, self.kinematics.points_of(0).len());
         let mut internal = Vec::new();
         for (points, law) in self.pieces(usize::MAX) {
             let flux = &self.stress.committed[points.start * place.point..points.end * place.point];

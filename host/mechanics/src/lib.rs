@@ -1,8 +1,8 @@
 //! The mechanics of a simulation, in memory: a [`Problem`] as plain values, elements and their laws, and
 //! a [`Simulation`] that leads them from equilibrium to equilibrium.
 //!
-//! Nothing here knows a file, a format or a path. What is to be computed comes in as values, what happens
-//! goes out to whoever [`Watch`]es, and what goes wrong comes back as data ([`Error`]).
+//! Nothing here knows a file, a format or a path. The problem comes in as values, progress goes out to whoever
+//! [`Watch`]es, and errors come back as data ([`Error`]).
 //!
 //! In the order in which data flows: [`problem`] and [`mesh`]; [`model`], which makes [`group`]s of
 //! [`element`]s of them, in the [`ground`]; [`assembly`] and [`equilibrium`]; [`simulation`].

@@ -8,7 +8,7 @@ use crate::group::{Group, PointFailure};
 use crate::mesh::{Mesh, Shape, Solid};
 use crate::problem::{
     Analysis, Axis, Cause, ElementGroup, Formulation, InPlane, InitialStress, Integration, Item,
-    Key, Material, Problem, Refusal, check, constraints, plausible, tension,
+    Key, Material, Problem, Refusal, check, constraints, plausibility, sign_check,
 };
 use abi::Hypothesis;
 use law::Operator;
@@ -17,8 +17,8 @@ use std::collections::{HashMap, HashSet};
 /// If one side of a layer is this many times the other, its normal is unambiguous.
 const CLEARLY: f64 = 2.0;
 
-/// An effective stress at rest that is less than this part of the weight and the water of which it is the
-/// difference is none.
+/// An effective stress at rest below this part of weight plus pore water, of which it is the difference, counts as
+/// zero.
 const ROUND_OFF_AT_REST: f64 = 1e-9;
 
 /// A problem with its elements.
@@ -49,8 +49,8 @@ impl From<Refusal> for BuildError {
     }
 }
 
-/// The hypothesis that a group's laws are built for. A thin layer takes interface laws and
-/// continuum laws, which `law` tells.
+/// The hypothesis that a group's laws are built for. A thin layer takes interface laws and continuum laws, as
+/// `is_interface_law` tells.
 pub fn hypothesis(
     analysis: Analysis,
     formulation: Formulation,
@@ -108,7 +108,7 @@ impl Model {
         }
         let ties = ties.ties;
         let mut warnings = constraints::check(problem, &ties)?;
-        warnings.extend(plausible::warnings(problem, &groups, &swaps));
+        warnings.extend(plausibility::warnings(problem, &groups, &swaps));
         Ok(Self {
             groups,
             ties,
@@ -485,7 +485,7 @@ impl GroupBuilder<'_> {
         let Some(InitialStress::Constant(stress)) = self.group.initial_stress else {
             return Ok(());
         };
-        match tension::turned(&material.built.law, self.group.formulation, stress) {
+        match sign_check::turned(&material.built.law, self.group.formulation, stress) {
             None => Ok(()),
             Some(refusal) => {
                 let cause = Cause::TurnedSigns {
@@ -566,8 +566,8 @@ impl GroupBuilder<'_> {
         stress
     }
 
-    /// Normal and shear stress with which a zero-thickness element begins at a place of it. Without an initial stress
-    /// of its own it is that of the ground on its two sides, projected on its facet.
+    /// Normal and shear stress with which a zero-thickness element begins at a place of it. Without a given initial
+    /// stress it is that of the ground on its two sides, projected on its facet.
     fn initial_traction(&self, nodes: &[usize], at: [f64; 2], axes: &Axes) -> [f64; 2] {
         let found = if self.group.initial_stress.is_some() {
             self.initial.at(self.number, at).unwrap_or_default()

@@ -1,21 +1,21 @@
 //! A problem as plain values: mesh, groups with their laws, supports, phases with their
 //! loads, settings. Units: kN, m, kPa; tension positive.
 
-pub(crate) mod alike;
-mod bared;
 pub(crate) mod check;
+mod compatibility;
 pub(crate) mod constraints;
-mod faces;
-mod futile;
 mod ground;
-mod held;
-mod likeness;
-pub(crate) mod plausible;
+mod ineffective_loads;
+mod loads_on_interfaces;
+pub(crate) mod plausibility;
 mod refusal;
-pub(crate) mod tension;
+mod restraint;
+pub(crate) mod sign_check;
+pub(crate) mod tied_dofs;
+mod uncovered_loads;
 
+pub use compatibility::{Compatibility, Incompatibility};
 pub use ground::{AtRest, Drainage, InitialStress, Profile, Ratio, Water};
-pub use likeness::{Likeness, Unlike};
 pub use refusal::{Cause, Item, JointFault, Key, Refusal};
 
 use crate::mesh::Mesh;
@@ -132,8 +132,8 @@ pub struct ElementGroup {
     pub formulation: Formulation,
     /// Their law before the first phase, or in it if it takes another.
     pub material: Material,
-    /// Where the law is evaluated; `None`: all Gauss points of solids and layers, the nodes of
-    /// zero-thickness elements.
+    /// Points at which the law is evaluated; `None`: all Gauss points of solids and layers, the nodes of zero-thickness
+    /// elements.
     pub integration: Option<Integration>,
     /// Thin layer: direction across the layer; `None`: that of the shorter sides.
     pub normal: Option<Axis>,
@@ -148,7 +148,7 @@ pub struct ElementGroup {
     pub saturated_unit_weight: Option<f64>,
     /// Water fills its pores below the water table: the law sees effective stresses.
     pub pore_water: bool,
-    /// It is there from the start; else a phase may activate it.
+    /// Active from the start; else a phase may activate it.
     pub is_active: bool,
     /// Whether pore water leaves freely.
     pub drainage: Drainage,
@@ -377,7 +377,8 @@ pub enum Integration {
     Full,
     /// Quads: 2 × 2 Gauss points; triangles: 3 (zero thickness: 2 Gauss points).
     Reduced,
-    /// Solids: as many points as `reduced` (quads: 3 along curved sides), with strains whose nodal forces are integrated exactly.
+    /// Solids: as many points as `reduced` (quads: 3 along curved sides), with strains whose nodal forces are
+    /// integrated exactly.
     Projected,
     /// Solids: all Gauss points (quads 9, triangles 6), with a volume strain that is linear in each element.
     BBar,

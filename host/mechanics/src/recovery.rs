@@ -1,9 +1,9 @@
-//! How far the strains on a mesh are from those that smoother ones would be: an estimate of the mesh's error.
+//! Estimate of a mesh's error: the distance of its strains from smoother, recovered ones.
 //!
-//! Displacements that are quadratic in an element have strains that are best at a few of its points (2 × 2 of a
-//! quad, 3 of a triangle). Around every corner a polynomial of second degree is fitted to the strains at these
-//! points of the elements there; what the strains of an element differ by from the mean of the polynomials of its
-//! corners is the estimated error (recovery by patches, after Zienkiewicz & Zhu 1992).
+//! Strains of quadratic displacements are most accurate at a few points of an element (2 × 2 of a quad, 3 of a
+//! triangle). Around every corner a polynomial of second degree is fitted to the strains at these points of the
+//! adjacent elements. The estimated error of an element is the difference of its strains from the mean of its corners'
+//! polynomials (recovery by patches, after Zienkiewicz & Zhu 1992).
 //!
 //! Strains come from the displacements of the nodes alone, so no law is asked. Neighbours are elements of the same
 //! group that share a node: strains may jump from group to group, and across an interface. In
@@ -20,14 +20,14 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// A group of fewer elements has no neighbours to tell anything.
+/// A group of fewer elements has too few neighbours.
 const LEAST_ELEMENTS: usize = 4;
 /// Elements whose strains are formed at a time.
 const PIECE: usize = 128;
-/// Fewer points than this do not bear a fit.
+/// Fewer points than this do not allow a fit.
 const LEAST_POINTS: usize = 12;
-/// Corners with less than this part of the points of the best corner of an element are not asked: at a boundary
-/// they see one side only.
+/// Corners with less than this part of the points of the best corner of an element are not used: at a boundary they see
+/// one side only.
 const ONE_SIDED: f64 = 0.6;
 
 /// Smaller strains (root of the mean square) are nothing but round-off.
@@ -42,8 +42,7 @@ type Strain = [f64; 4];
 /// The estimated error of the strains on a mesh.
 #[derive(Clone, Debug, Default)]
 pub struct MeshError {
-    /// By group; none where it is not estimated: of interfaces and layers, of what is absent, of a
-    /// few elements.
+    /// By group; `None` where it is not estimated: interfaces and layers, absent groups, groups of few elements.
     groups: Vec<Option<GroupError>>,
     /// Over all of them.
     all: Sums,

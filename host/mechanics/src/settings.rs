@@ -20,8 +20,8 @@ pub struct Settings {
     #[serde(deserialize_with = "tolerance")]
     pub displacement_tolerance: f64,
     /// Residual, relative as `force_tolerance`, that is tolerated where Newton iterations and relaxation come to a
-    /// standstill above the tolerance and displacements have settled to a tenth of the increment;
-    /// each is reported, and counted in the summary. 0 tolerates none.
+    /// standstill above the tolerance and displacements have settled to a tenth of the increment. Each is reported and
+    /// counted in the summary. 0 tolerates none.
     #[serde(deserialize_with = "tolerated")]
     pub tolerated_residual: f64,
     /// What counts as equilibrium.

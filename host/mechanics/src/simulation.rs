@@ -1,49 +1,49 @@
 //! Leading a problem through its phases: increments, cut-back and regrowth, from equilibrium to
 //! equilibrium.
 
-mod appearing;
-mod beyond;
-mod complete;
+mod activation;
+mod arc_length;
+mod commit;
 mod continuation;
-mod ending;
 mod history;
 mod loads;
-mod motion;
-mod path;
+mod observer;
+mod path_dependence;
 mod phase;
-mod record;
+mod phase_failure;
+mod phase_statistics;
 mod start;
 mod state;
 mod statics;
 mod steps;
 mod tangents;
 mod ties;
+mod validity;
 mod warning;
-mod watch;
 
-pub use motion::Neighbour;
-pub use record::PhaseRecord;
+pub use observer::{Increment, Part, Watch, When};
+pub use path_dependence::Neighbour;
+pub use phase_statistics::PhaseRecord;
 pub use state::State;
 pub use warning::Warning;
-pub use watch::{Increment, Part, Watch, When};
 
 use crate::assembly::Tie;
 use crate::equilibrium::{Clock, Reuse};
 use crate::error::{Error, Place};
 use crate::ground::{Acting, Loading};
-use crate::group::{Group, joined};
+use crate::group::{Group, tied_nodes};
 use crate::mesh::Mesh;
 use crate::model::Model;
 use crate::problem::{Material, Problem};
 use crate::settings::{Method, Settings};
 use algebra::mesh_lines;
-use beyond::Beyond;
 use history::History;
-use law::{Moment, Stop, custody};
+use law::{Moment, Stop, process_state};
 use phase::PhaseEquations;
 use state::PhaseCourse;
 use std::collections::BTreeMap;
 use std::ops::ControlFlow;
+use validity::Validity;
 
 /// View of a state of equilibrium.
 #[derive(Clone, Copy, Debug)]
@@ -101,7 +101,7 @@ pub struct Simulation {
     /// The same at every degree of freedom.
     largest_forces: Vec<f64>,
     /// Results that the theory does not cover.
-    beyond: Beyond,
+    beyond: Validity,
     /// Rotations call forth no stresses in any group.
     turns_freely: bool,
     /// Mesh lines of the nodes.
@@ -173,7 +173,7 @@ impl Simulation {
             time: 0.0,
             largest_force: 0.0,
             largest_forces: vec![0.0; n_dofs],
-            beyond: Beyond::default(),
+            beyond: Validity::default(),
             turns_freely,
             lines: mesh_lines(nodes),
             reuse,
@@ -267,7 +267,7 @@ impl Simulation {
     /// Sum of the reactions at the nodes of a line, x and y: kN of the whole turn, or kN/m. `None`
     /// if there is no such line.
     pub fn reaction_of(&self, line: &str) -> Option<[f64; 2]> {
-        let nodes = joined(&self.groups, &self.problem.mesh.lines.get(line)?.nodes);
+        let nodes = tied_nodes(&self.groups, &self.problem.mesh.lines.get(line)?.nodes);
         Some([0, 1].map(|c| nodes.iter().map(|node| self.reaction[2 * node + c]).sum()))
     }
 
@@ -411,7 +411,7 @@ impl Simulation {
         let done = match self.reach(&place, n, phase, watch) {
             Ok(done) => done,
             Err(error) => {
-                let _ = custody::restore();
+                let _ = process_state::restore();
                 if matches!(error, Error::NoEquilibrium(_)) {
                     self.tell_torn(&place, false, watch);
                 }
@@ -429,7 +429,7 @@ impl Simulation {
         self.complete(phase, looked_at.as_ref())
             .map_err(|reason| self.incomplete(phase, &place, lambda, reason))?;
         self.tell_torn(&place, true, watch);
-        let restored = custody::restore().map_err(|why| Error::Process {
+        let restored = process_state::restore().map_err(|why| Error::Process {
             place: place.clone(),
             why,
         })?;
@@ -454,7 +454,7 @@ impl Simulation {
     fn tell_torn(&mut self, place: &Place, reached: bool, watch: &mut dyn Watch) {
         for group in self.groups.iter_mut().filter(|group| group.is_active) {
             if let Some(torn) = group.torn(reached) {
-                watch.warning(&Warning::Torn(place.clone(), torn));
+                watch.warning(&Warning::BrokenBond(place.clone(), torn));
             }
         }
     }

@@ -261,8 +261,8 @@ fn level_ground_at_rest_stays() {
     }
 }
 
-/// Three layers, the upper two of them not over all of the lowest; a surcharge on the top one is carried down, that of a group
-/// itself wins, and with the load that it stands for nothing moves.
+/// A surcharge on the top of three layers is carried down, that of a group itself wins, and under the load that it
+/// represents nothing moves.
 #[test]
 fn a_surcharge_is_carried_down_and_at_rest() {
     const KPA: f64 = 50.0;
@@ -412,7 +412,7 @@ fn level_ground_of_curved_elements_stays() {
     }
 }
 
-/// What a changed water table does to elements in which it stands is not exact, and is reported so.
+/// A changed water table inside elements is not computed exactly, and is reported.
 #[test]
 fn a_water_table_inside_elements_is_announced_where_it_changes() {
     let warnings = |from: f64, to: Option<f64>| {
@@ -613,8 +613,8 @@ fn ground_that_appears_undrained_is_undrained() {
     }
 }
 
-/// ν_u that does not exceed ν of the law leaves no stiffness to the water; an earth pressure at rest that
-/// would be tension is none. Both are refused with their numbers.
+/// With ν_u not above ν of the law the water has no stiffness; earth pressure at rest cannot be tension. Both are
+/// refused with their numbers.
 #[test]
 fn ground_that_cannot_be_is_refused() {
     let analysis = Analysis::PlaneStrain;

@@ -216,8 +216,8 @@ fn a_state_is_gone_on_from_twice() {
     assert!(matches!(finer.go_to(state), Err(Error::OtherState(_))));
 }
 
-/// What was in play in earlier phases is part of a state: where nothing is left of it, what remains is round-off, in
-/// phases long after a stop too.
+/// A state contains the largest forces of earlier phases: measured by them the rest after unloading is round-off, also
+/// in phases long after a stop.
 #[test]
 fn the_largest_forces_of_earlier_phases_are_gone_on_with() {
     let mut problem = sliding(|mesh| mesh, 30.0);
@@ -311,8 +311,8 @@ fn a_layer_whose_stiffness_follows_the_stress_is_gone_on_from() {
     }
 }
 
-/// A line whose ends had sunk by different amounts when it became rigid is led to one total, as one that is not rigid is; what
-/// bends it straight is reported if it is much. What counts again keeps it as it stands.
+/// A line whose ends had sunk by different amounts when it became rigid is led to one total, like one that is not
+/// rigid; the straightening is reported if it is large. With reset displacements it keeps its tilt.
 #[test]
 fn a_tilted_line_that_became_rigid_is_led_to_one_place() {
     struct Heard(Vec<String>);
@@ -409,7 +409,7 @@ fn a_rigid_line_that_is_pulled_apart_later_is_refused_at_once() {
     with(true, 0.0).unwrap().run(&mut ()).unwrap();
 }
 
-/// What holds one node of a rigid line holds the line: its reaction is the whole, and all reactions are in balance.
+/// A prescribed node of a rigid line holds the whole line: its reaction is that of the line, and all reactions balance.
 #[test]
 fn a_node_that_leads_a_rigid_line_has_its_reaction() {
     let mut mesh = Mesh::grid(&[0.0, 0.5, 1.0], &[0.0, 1.0], |_, _| 0);
@@ -465,7 +465,7 @@ fn simulations_do_not_see_each_other() {
     assert!(together[0] != together[1]);
 }
 
-/// What does not fit is reported with the part that it is, not in a sentence.
+/// Refusals name the faulty part as data, not in a sentence.
 #[test]
 fn a_problem_that_cannot_be_is_refused_by_its_part() {
     use mechanics::problem::{Cause, Item};

@@ -1,8 +1,8 @@
 //! One law along a path at one integration point, in memory, with mixed control of its components.
 //!
-//! A [`Driver`] leads a point through [`Segment`]s; each component follows a gradient (a jump or
-//! strain), a flux (a traction or stress), or a stiffness ([`Control`]). [`Driver::run`] follows the
-//! path and hands out a [`Row`] for each increment.
+//! A [`Driver`] leads a point through [`Segment`]s. Each component follows a gradient (a jump or
+//! strain), a flux (a traction or stress), or a stiffness ([`Control`]). The path is followed by
+//! [`Driver::run`], which hands out a [`Row`] for each increment.
 //!
 //! Units are m and kPa, shear strains are γ = 2ε; opening and tension are positive. Components are
 //! those of the law's [hypothesis](abi::Hypothesis::components), in their order; arrays over them
@@ -38,24 +38,24 @@
 //! out rows, `walk` carries the point over an increment in steps, `search` finds the equilibrium of a
 //! step.
 
-mod anchor;
-mod course;
 mod driver;
 mod error;
+mod follow;
 mod frame;
+mod ignored_input;
+mod increments;
+mod messages;
 mod path;
 mod restrictions;
 mod search;
-mod silence;
 mod state;
-mod walk;
-mod words;
+mod tolerance_scale;
 
-pub use course::{Course, Row};
 pub use driver::{Driver, TIME};
 pub use error::{
     Cause, Criterion, Error, Failure, Misuse, Moved, NoEquilibrium, Place, Unmet, Warning,
 };
+pub use follow::{Course, Row};
 pub use frame::Frame;
 pub use path::{Control, MAX_INCREMENTS, Segment};
 pub use restrictions::{Restrictions, Rows};

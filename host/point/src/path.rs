@@ -93,8 +93,8 @@ pub struct Segment {
 }
 
 impl Segment {
-    /// A step of its own with this many increments of one unit of time, through which every component
-    /// keeps its flux (the strain 33 in plane strain stays 0).
+    /// A separate step with this many increments of one unit of time. Every component keeps its flux
+    /// (in plane strain the strain 33 stays 0).
     pub fn new(hypothesis: Hypothesis, step: u32, increments: usize) -> Self {
         let mut control = [Control::Keep; N_MAX];
         if hypothesis == Hypothesis::PlaneStrain {

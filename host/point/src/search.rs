@@ -10,31 +10,30 @@
 //! Under [`Restrictions`] all components are free, and what these make of the changes since the start of
 //! the segment stands for the flux.
 //!
-//! Newton's method with the law's tangent, restricted to f, comes first ([`newton`]). If that
-//! matrix is singular, the step is the least-squares solution of minimum norm ([`direction`]). A
-//! line search
-//! keeps ‖r‖ falling. If it does not fall, the flux does not respond to the remaining r: on an edge,
-//! at an apex, over an open gap. Then a search along the elastic direction leaves that zone. Where this
-//! ends too, fixed-point iterations with the elastic operator go on ([`relaxation`]). What counts as the
-//! end is reported in [`acceptance`].
+//! Newton's method with the law's tangent, restricted to f, comes first ([`newton`]). If that matrix is
+//! singular, the step is the least-squares solution of minimum norm ([`direction`]). A line search keeps
+//! ‖r‖ falling. If it does not fall, the flux does not respond to the remaining r: on an edge, at an
+//! apex, over an open gap. Then a search along the elastic direction leaves that zone. Where this ends
+//! too, fixed-point iterations with the elastic operator go on ([`relaxation`]). The criteria for the
+//! end are in [`acceptance`].
 
 mod acceptance;
 mod direction;
 mod newton;
+mod norm;
 mod obstacle;
 mod relaxation;
-mod size;
 
 pub(crate) use obstacle::{Miss, Obstacle};
 
-use crate::anchor::Anchor;
 use crate::frame::Frame;
 use crate::restrictions::Restrictions;
 use crate::state::{Goal, N_MAX, Point, Step, Vector};
+use crate::tolerance_scale::ToleranceScale;
 use abi::status::Outcome;
 use acceptance::Verdict;
 use law::{BatchFailure, End, Law, Moment, Operator, Start, Stop, Strided};
-use size::{largest, same};
+use norm::{largest, same};
 use std::mem::swap;
 
 /// The law's answer to one gradient.
@@ -64,7 +63,7 @@ pub(crate) struct Search<'a> {
     /// The same in the components themselves.
     elastic_cartesian: Vec<f64>,
     elastic_norm: f64,
-    anchor: Anchor,
+    anchor: ToleranceScale,
     tangent: Operator,
     relaxation: Operator,
     base: Sample,
@@ -86,7 +85,7 @@ pub(crate) struct Search<'a> {
 impl<'a> Search<'a> {
     pub(crate) fn new(law: &'a Law, start: &Point) -> Self {
         let n = law.n_components();
-        let mut anchor = Anchor::default();
+        let mut anchor = ToleranceScale::default();
         start.flux.iter().for_each(|flux| anchor.flux(*flux));
         let sample = Sample {
             point: start.clone(),
@@ -250,10 +249,9 @@ impl<'a> Search<'a> {
         swap(point, &mut self.base.point);
     }
 
-    /// Whether the law took no notice of the step found: the gradient moved, flux and internal
-    /// variables stayed to the last bit, and its operator is zero, on the way back as well, or says that
-    /// they should not have.
-    /// `None`: the gradient did not move.
+    /// Whether the law ignored the step found: the gradient moved, but flux and internal variables are
+    /// unchanged to the last bit. Besides, its operator either predicts a change or is zero, and a step
+    /// back changes nothing. `None`: the gradient did not move.
     pub(crate) fn is_ignored(&mut self, step: &Step<'_>) -> Result<Option<bool>, Fatal> {
         let (start, end) = (step.start, &self.base.point);
         if same(&start.gradient, &end.gradient) {

@@ -1,4 +1,4 @@
-"""What can go wrong, as exceptions that say as data where and why."""
+"""Exceptions, with the place and the cause as data."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ def warn(message: str) -> None:
 
 
 class Error(Exception):
-    """Anything that Pilum cannot do. What an attribute does not apply to has None.
+    """Anything that Pilum cannot do. Attributes that do not apply are None.
 
-    What Python has a class for is of that class, too: a wrong value or shape is a ValueError as well, a wrong type a
-    TypeError, a name that is not there a KeyError, memory that is not there a MemoryError.
+    It is also of Python's class for that error: ValueError for a wrong value or shape, TypeError for a wrong type,
+    KeyError for an unknown name, MemoryError for lack of memory.
     """
 
     message: str
-    """What is wrong."""
+    """Description of the error."""
     hint: str | None = None
     """What could be done about it."""
     place: str | None = None
@@ -73,9 +73,9 @@ class Error(Exception):
     column: int | None = None
     """The column of it, from 1."""
     key: str | None = None
-    """Of a dictionary, or of `set`: the key that is wrong, as `set` has it; entries of lists by their `name`, or from 1."""
+    """In a dictionary, or in `set`: the wrong key, written as in `set`; entries of lists by their `name`, or from 1."""
     text: str | None = None
-    """What stands there."""
+    """The text at that place."""
 
     def __init__(self, message: str = "", **attributes: Any) -> None:
         super().__init__(message)
@@ -100,7 +100,7 @@ class Error(Exception):
 
 
 def _again(kind: type[Error], message: str, attributes: dict[str, Any]) -> Error:
-    """What another process has raised."""
+    """An error that another process has raised."""
     error = kind(message)
     error.__dict__.update(attributes)
     return error
@@ -131,7 +131,7 @@ class NoMemoryError(Error, MemoryError):
 
 
 class NoEquilibriumError(Error):
-    """There is no equilibrium, or none was found. What was found until then is there."""
+    """There is no equilibrium, or none was found. Results up to then are kept."""
 
 
 class LawError(Error):

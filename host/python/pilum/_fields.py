@@ -53,7 +53,7 @@ class Field(Mapping[str, NDArray[np.float64]]):
 
     @property
     def table(self) -> Table:
-        """What cells have, as columns of a table, with the coordinates of their middles."""
+        """Values of cells, as columns of a table, with the coordinates of their middles."""
         starts = np.concatenate([[0], self._ends[:-1]])
         n = self._ends - starts
         middle = np.add.reduceat(self.nodes[self._connectivity], starts) / n[:, None]

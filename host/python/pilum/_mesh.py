@@ -226,7 +226,7 @@ def _array(name: str, values: Any) -> NDArray[Any]:
 
 
 def _numbers(name: str, values: ArrayLike) -> NDArray[np.float64]:
-    """Numbers; texts and objects are none, though NumPy makes some of them."""
+    """Numbers. Texts and objects are refused, though NumPy would convert some."""
     array = _array(name, values)
     if array.dtype.kind not in "biuf":
         raise InputError(f"{name}: found an array of {array.dtype}, expected numbers")
@@ -244,7 +244,7 @@ def _edges(part: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _dimension(kind: int) -> int:
-    """Of one of Gmsh's kinds."""
+    """Dimension of one of Gmsh's kinds."""
     return {15: 0, 1: 1, 8: 1}.get(kind, 2)
 
 

@@ -17,7 +17,7 @@ __all__ = ["Results"]
 
 
 class Results:
-    """What a run has written into a folder. Tables are read when they are asked for, and refused with InputError
+    """Results of a run in a folder. Tables are read when they are asked for, and refused with InputError
     where another run has written there since: give each run its own folder with `results`.
     """
 
@@ -75,7 +75,7 @@ class Results:
 
     @property
     def warnings(self) -> list[str]:
-        """What the run has warned of."""
+        """Warnings of the run."""
         return list(self.summary["warnings"])
 
     @property

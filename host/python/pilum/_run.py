@@ -19,7 +19,7 @@ Case: TypeAlias = Union[str, "os.PathLike[str]", Mapping[str, Any]]
 
 
 class Progress(NamedTuple):
-    """An increment that has reached equilibrium, as `watch` is told of it."""
+    """An increment that has reached equilibrium, as passed to `watch`."""
 
     phase: str
     """Name of the phase."""
@@ -51,13 +51,13 @@ class Step(TypedDict):
 
 
 class Problem:
-    """What is to be computed: a case, as a file or as a dictionary with the same keys, perhaps on a mesh of arrays.
+    """A problem to compute: a case, as a file or as a dictionary with the same keys, perhaps on a mesh of arrays.
 
-    `case` is a case file, a folder with `case.toml`, or a dictionary with the keys of a case file; its `laws` may
-    be `pilum.Law`s, which are looked for in their `law_path`, too; if one of them is isolated, all are. `mesh` is a `pilum.Mesh` or a mesh of meshio; then the dictionary needs no key `mesh`. `set`
-    gives settings over the case, `{"phase.push.increments": 80}`; `variant` names one of several; `isolate` calls
-    laws in processes of their own, which may take so many seconds for a call. Paths in a dictionary are relative
-    to the working folder.
+    `case` is a case file, a folder with `case.toml`, or a dictionary with the keys of a case file. Its `laws` may be
+    `pilum.Law`s; their `law_path` is searched, too, and if one of them is isolated, all are. `mesh` is a `pilum.Mesh`
+    or a mesh of meshio; then the dictionary needs no key `mesh`. `set` overrides settings of the case,
+    `{"phase.push.increments": 80}`; `variant` names one of several. `isolate` calls laws in separate processes; it is
+    the number of seconds that a call may take. Paths in a dictionary are relative to the working folder.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class Problem:
         isolate: float | None = None,
     ) -> None:
         self.name = name
-        """What it is called, and its folder of results, where it comes from no file."""
+        """Name of the problem, and of its folder of results if it does not come from a file."""
         self._mesh: bytes | None = None
         if mesh is not None:
             if not isinstance(case, Mapping):
@@ -177,13 +177,13 @@ def run(
     """Runs a case and returns its `Results`; of a case with variants a dictionary of them by their names.
 
     `case` is a file, a folder with `case.toml`, a dictionary with the keys of a case file, or a `Problem`. `set`
-    gives settings over it: `{"phase.push.increments": 80, "laws.mepi.parameters.k_n": 2e5}`. `watch` is called
+    overrides its settings: `{"phase.push.increments": 80, "laws.mepi.parameters.k_n": 2e5}`. `watch` is called
     with a `Progress` after every increment, by the thread that called; what it raises stops the run and is raised
     here. Ctrl-C stops the run; everything up to then is in its folder, and `resume=True` goes on from there.
 
-    Results go into `results`, or where the command puts them: `results/<case>`. `checkpoints` are written so many
-    seconds after one another. With `isolate` laws are called in processes of their own, for at most so many
-    seconds a call: a law that crashes raises LawError.
+    Results go into `results`, or where the command puts them: `results/<case>`. `checkpoints` is the time
+    between checkpoints in seconds. `isolate` calls laws in separate processes, and is the number of seconds that a
+    call may take: a law that crashes raises LawError.
 
     A type checker sees `Results`, since it does not read the case: with variants,
     `runs = typing.cast("dict[str, pilum.Results]", pilum.run(case))`.

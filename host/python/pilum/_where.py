@@ -1,4 +1,4 @@
-"""Where the program, the laws and the headers are that came with the package."""
+"""Places of the program, the laws and the headers that came with the package."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def program() -> Path:
 
 
 def include() -> Path:
-    """The folder of the headers for laws in C and C++; `pilum_law.f90` for Fortran is in `share` beside it."""
+    """The folder of the headers for laws in C and C++; `pilum_law.f90` for Fortran is in `share` next to it."""
     return _INSTALLED / "include" / "pilum"
 
 

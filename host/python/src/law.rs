@@ -41,11 +41,10 @@ pub(crate) fn warn(py: Python<'_>, message: &str) -> PyResult<()> {
 
 /// A constitutive law with its parameters fixed, for any number of points.
 ///
-/// Parameters are given by name, in the units of `pilum.describe(id)`: kPa, m, degrees. Omitted
-/// parameters take their default. Keys that are no parameters are those of a table of laws in a
-/// case file: `adapter`
-/// ("umat", "mfront", "udsm", "shear_zone"), `library`, `sidecar`, `thickness`, `initial` and so on; a parameter
-/// of such a name goes into `parameters`.
+/// Parameters are given by name, in the units of `pilum.describe(id)`: kPa, m, degrees. Omitted parameters take
+/// their default. Other keys are those of a law in a case file: `adapter` ("umat", "mfront", "udsm",
+/// "shear_zone"), `library`, `sidecar`, `thickness`, `initial` and so on. A parameter of such a name goes into
+/// `parameters`.
 #[pyclass(frozen, module = "pilum")]
 pub(crate) struct Law {
     built: Arc<BuiltLaw>,
@@ -225,10 +224,10 @@ impl Law {
     /// Points that carry these fluxes before anything has happened, with the internal variables that the law gives
     /// them.
     ///
-    /// `points` is their number, `flux` their tractions or stresses (kPa, tension positive; zero if left out),
-    /// shape (n, components) or (components,) for all; `gradient` jumps or strains that they have already,
-    /// likewise. With `internal`, shape (n, variables) in the order of `variables`, they have these instead of the
-    /// law's own: with the `time` and the `increment` of a state, what was kept of it goes on from there.
+    /// `points` is their number. `flux` gives their tractions or stresses (kPa, tension positive; zero if left
+    /// out), shape (n, components) or (components,) for all; `gradient` gives jumps or strains that they have
+    /// already, likewise. `internal`, shape (n, variables) in the order of `variables`, replaces the law's own
+    /// initial values. With the `time` and the `increment` of a saved state too, the points go on from it.
     #[pyo3(signature = (points=None, *, flux=None, gradient=None, internal=None, time=0.0, increment=0))]
     #[expect(clippy::too_many_arguments, reason = "named in Python")]
     fn initial(

@@ -13,5 +13,5 @@ pub(crate) fn stands_for(program: PathBuf) {
 #[pyfunction]
 pub(crate) fn goes_on_as_copy() {
     #[cfg(unix)]
-    law::calls::goes_on_as_copy();
+    law::current_call::goes_on_as_copy();
 }

@@ -8,7 +8,7 @@ use crate::task::{Caller, carry_out};
 use input::{Case, Error};
 use law::Stop;
 use mechanics::group::Group;
-use mechanics::problem::Likeness;
+use mechanics::problem::Compatibility;
 use mechanics::simulation::{Increment, Warning};
 use mechanics::{State, Watch};
 use numpy::PyArray1;
@@ -30,7 +30,7 @@ struct Inner {
     /// For the first nodes, the place in the mesh that the case names; `None` of a grid.
     kept: Option<Arc<[usize]>>,
     /// What states of it depend on, once one was taken.
-    likeness: Option<Arc<Likeness>>,
+    likeness: Option<Arc<Compatibility>>,
     /// The last increment of the last phase is done. The simulation is not led beyond it: a state could not be taken
     /// of it any more.
     is_done: bool,
@@ -43,7 +43,7 @@ struct Inner {
 #[pyclass(frozen, module = "pilum")]
 pub(crate) struct SimulationState {
     state: State<'static>,
-    likeness: Arc<Likeness>,
+    likeness: Arc<Compatibility>,
     /// Number of the phase, from 0.
     #[pyo3(get)]
     phase: usize,
@@ -145,7 +145,7 @@ impl Simulation {
 }
 
 impl Inner {
-    fn likeness(&mut self) -> Arc<Likeness> {
+    fn likeness(&mut self) -> Arc<Compatibility> {
         let problem = self.simulation.problem();
         let likeness = self
             .likeness

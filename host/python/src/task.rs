@@ -18,8 +18,8 @@ const LOOK: Duration = Duration::from_millis(50);
 /// The threads that work, and the process that they belong to.
 static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
 
-/// The threads of this process: a forked copy has none of the threads of the original. Processes
-/// that they start live as long as they do.
+/// The threads of this process: a forked copy lacks the threads of the original. Processes that
+/// they start live as long as they do.
 ///
 /// # Errors
 /// `RuntimeError` if they cannot be started.

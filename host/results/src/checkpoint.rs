@@ -147,7 +147,8 @@ impl<'c> Checkpoint<'c> {
 struct Summed {
     file: File,
     sum: Sha256,
-    /// The encoder would take a failure for one of its own: it is kept until everything is encoded.
+    /// Kept until everything is encoded: the encoder would take a failure here for an encoding
+    /// error.
     outcome: io::Result<()>,
 }
 

@@ -1,9 +1,9 @@
 //! Fields for viewers that read VTK files: `fields.pvd` lists one `fields_<n>.vtu` per time.
 
 use crate::file;
+use crate::output_request::{Output, When};
 use crate::pressures::Pressure;
 use crate::table::{push_count, push_shortest};
-use crate::wanted::{Output, When};
 use mechanics::Simulation;
 use mechanics::problem::Formulation;
 use mechanics::recovery::MeshError;

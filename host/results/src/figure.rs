@@ -1,9 +1,9 @@
-//! Curves of probes, of stresses along a cut or of what holds along a pile, and measured points beside
-//! them, as SVG.
+//! Figures as SVG: curves of probes, of stresses along a cut or of quantities along a pile, with
+//! measured points.
 
+use crate::output_request::{Cut, Figure, Measured};
 use crate::pile::Station;
 use crate::pressures::Pressure;
-use crate::wanted::{Cut, Figure, Measured};
 use mechanics::Place;
 use mechanics::simulation::Snapshot;
 use plotters::prelude::*;

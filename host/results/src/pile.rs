@@ -14,7 +14,7 @@
 
 mod criteria;
 mod geometry;
-mod oddities;
+mod plausibility;
 mod table;
 
 pub use criteria::{Curve, Resistances};
@@ -111,7 +111,7 @@ pub struct Station {
     pub settlement: f64,
 }
 
-/// What is known of a [`Station`]: columns of `pile.csv`, and what figures along the pile may show.
+/// Quantities of a [`Station`]: columns of `pile.csv`, and choices for figures along the pile.
 pub const OF_STATION: [&str; 6] = [
     "z",
     "axial_force",
@@ -372,8 +372,8 @@ impl Pile {
         held
     }
 
-    /// Where an interface that is absent begins at the head, its faces are one, and what the ground
-    /// exerts on the pile is known from the ground's own forces.
+    /// If an absent interface begins at the head, its faces move as one. The force of the ground on
+    /// the pile there follows from the ground's own forces.
     fn take_from_ground(&self, snapshot: &Snapshot<'_>, held: &mut [Held<'_>], n_dofs: usize) {
         let head = &self.geometry.head;
         let mut taken: Option<Vec<f64>> = None;
@@ -415,9 +415,9 @@ impl Pile {
         outer
     }
 
-    /// Friction, effective normal stress (compression positive) and slip at a station: the means over the
-    /// elements of the shaft there, by their girth (a tube holds more outside than inside), each with the
-    /// mean of its integration points that are nearest.
+    /// Friction, effective normal stress (compression positive) and slip at a station: means over the
+    /// elements of the shaft there, weighted by their girth (a tube holds more outside than inside). The
+    /// value of an element is the mean at its nearest integration points.
     fn at(&self, snapshot: &Snapshot<'_>, split: &Split<'_>, z: f64) -> [Option<f64>; 3] {
         let close = 1e-9 * self.geometry.length();
         let there = split.segments.iter();

@@ -1,9 +1,9 @@
 //! Stresses at all integration points.
 
 use crate::file::Extent;
+use crate::output_request::When;
 use crate::pressures::Pressure;
 use crate::recorder::{Cell, Table, internal_variables};
-use crate::wanted::When;
 use mechanics::simulation::Snapshot;
 use mechanics::{Place, Simulation};
 use std::path::Path;

@@ -3,10 +3,10 @@
 mod section;
 mod size;
 
+use crate::output_request::Reduce;
 use crate::pressures::Pressure;
-use crate::wanted::Reduce;
 use mechanics::assembly::fold;
-use mechanics::group::{Group, joined};
+use mechanics::group::{Group, tied_nodes};
 use mechanics::simulation::{Part, Simulation, Snapshot};
 pub use section::{Section, section};
 pub use size::Sizes;
@@ -213,7 +213,7 @@ impl Probe {
                     nodes.iter().map(|&n| forces[2 * n + component]).sum()
                 };
                 let Some(number) = *group else {
-                    let nodes = joined(snapshot.groups, nodes);
+                    let nodes = tied_nodes(snapshot.groups, nodes);
                     return Some(scale * sum(&nodes, snapshot.reaction));
                 };
                 let group = active(snapshot, number)?;
@@ -296,8 +296,8 @@ impl PointQuantity {
         }
     }
 
-    /// What a point stands for: its volume; of tractions, jumps and internal variables of a layer
-    /// or interface its area (in axisymmetry of the whole turn).
+    /// Weight of a point: its volume, or for tractions, jumps and internal variables of a layer or
+    /// interface its area (in axisymmetry of the whole turn).
     pub fn weight(&self, group: &Group, point: usize) -> f64 {
         let weight = group.kinematics.weight(point);
         match (self, group.thickness(point)) {

@@ -8,6 +8,7 @@ use crate::figure::{Curve, Figures};
 use crate::file::{self, Appended, Extent};
 use crate::leftovers;
 use crate::mesh_error::OfPhase;
+use crate::output_request::{Output, OutputRequest, When};
 use crate::pile::{Curve as PileCurve, Pile, Resistances, State as PileState, Stations};
 use crate::points::Points;
 use crate::probe::{Probes, Sizes};
@@ -15,7 +16,6 @@ use crate::profile::Profile;
 use crate::report::Known;
 use crate::summary::{About, Course, Ending, Stopped, Summary};
 use crate::table::{push, push_count, push_text};
-use crate::wanted::{Output, Wanted, When};
 use mechanics::equilibrium::Iteration;
 use mechanics::group::Group;
 use mechanics::simulation::{self, Increment, PhaseRecord, Snapshot};
@@ -95,14 +95,14 @@ impl ResultsState {
     }
 
     /// The figures of the run.
-    pub fn figures(self, wanted: &Wanted) -> Figures {
+    pub fn figures(self, wanted: &OutputRequest) -> Figures {
         let mut figures = empty_figures(wanted);
         figures.restore(self.curves);
         figures
     }
 }
 
-fn empty_figures(wanted: &Wanted) -> Figures {
+fn empty_figures(wanted: &OutputRequest) -> Figures {
     let names = wanted.columns().map(str::to_owned).collect();
     Figures::new(&wanted.title, &wanted.figures, names)
 }
@@ -264,7 +264,7 @@ impl Recorder {
     /// [`Error::Unwritable`].
     pub fn create(
         folder: &Path,
-        wanted: Wanted,
+        wanted: OutputRequest,
         about: &About,
         simulation: &Simulation,
     ) -> Result<Self, Error> {
@@ -281,7 +281,7 @@ impl Recorder {
     /// [`Error::Unwritable`].
     pub fn resume(
         folder: &Path,
-        wanted: Wanted,
+        wanted: OutputRequest,
         about: &About,
         simulation: &Simulation,
         state: ResultsState,
@@ -295,7 +295,7 @@ impl Recorder {
 
     fn begin(
         folder: &Path,
-        mut wanted: Wanted,
+        mut wanted: OutputRequest,
         about: &About,
         simulation: &Simulation,
         log: LogFile,

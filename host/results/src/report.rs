@@ -12,11 +12,11 @@ mod comparison;
 mod fields;
 mod log;
 mod model;
+mod number_format;
 mod page;
 mod pile;
 mod profile;
 mod results;
-mod short;
 mod study;
 mod table;
 
@@ -25,9 +25,9 @@ pub(crate) use profile::{Point, Profiles};
 use text::Error;
 use text::write::replace_whole;
 
-use crate::record;
+use crate::output_request::OutputRequest;
 use crate::summary::About;
-use crate::wanted::Wanted;
+use crate::summary_reader;
 use budget::Budget;
 use mechanics::Simulation;
 use results::Run;
@@ -49,16 +49,16 @@ pub fn default_path(folders: &[PathBuf]) -> PathBuf {
     }
 }
 
-/// What a process has written into a results folder and still knows: a report of it does not read that again,
-/// which for the profiles of `cases/chamber_mesh1` is a tenth of the instructions of the whole run.
+/// Results that a process has written into a folder and still knows, so that a report need not read them
+/// again. For the profiles of `cases/chamber_mesh1` that saves a tenth of the instructions of the whole run.
 #[derive(Debug, Default)]
 pub struct Known {
     /// Length of `profile.csv`, and what is shown of it.
     pub(crate) profile: Option<(u64, Profiles)>,
 }
 
-/// The report of a run, or of a study, that is under way: written again at most once a second, and so seldom
-/// that it takes about a hundredth of the time; marked, and reloading itself.
+/// The report of a run, or of a study, that is under way. It is marked as such and reloads itself. It is
+/// rewritten at most once a second, and so seldom that this takes about a hundredth of the time.
 #[derive(Debug)]
 pub struct Running {
     folder: PathBuf,
@@ -67,7 +67,7 @@ pub struct Running {
 
 /// Least time between two of them; a shorter run has no interim report.
 const EVERY: Duration = Duration::from_secs(1);
-/// So many times as long as writing one takes, none is written.
+/// The pause after a report, in times that writing it took.
 const SELDOM: u32 = 100;
 
 impl Running {
@@ -120,7 +120,7 @@ fn has_results(folder: &Path) -> bool {
 pub fn write_dry(
     folder: &Path,
     about: &About,
-    wanted: &Wanted,
+    wanted: &OutputRequest,
     simulation: &Simulation,
     warnings: &[String],
 ) -> Result<PathBuf, Error> {
@@ -156,7 +156,7 @@ fn study_among(folders: &[PathBuf]) -> Result<Option<&Path>, Error> {
 fn read(folders: &[PathBuf], known: Option<Known>) -> Result<Vec<Run>, Error> {
     let budget = Budget::of(folders.len());
     let mut known = known.filter(|_| folders.len() == 1).unwrap_or_default();
-    let named = record::names(folders).into_iter().zip(folders);
+    let named = summary_reader::names(folders).into_iter().zip(folders);
     named
         .map(|(name, folder)| Run::read(&name, folder, std::mem::take(&mut known), &budget))
         .collect()

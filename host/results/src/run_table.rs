@@ -1,8 +1,8 @@
 //! A table of runs, one row each: how they ended, the settings in which they differ, and the last
 //! values of their probes. For a study: its parameters, its outputs, and every run.
 
-use crate::record::{entries, names, settings, settings_of_files, text};
 use crate::study::{self, History, State};
+use crate::summary_reader::{entries, names, settings, settings_of_files, text};
 use indexmap::{IndexMap, IndexSet};
 use serde_json::{Value, json};
 use std::io;

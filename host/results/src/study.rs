@@ -1,7 +1,7 @@
-//! A study in a folder: `study.json`, what it is; `runs.csv`, its runs, a row each, made at the start, with what counts of
-//! their results as they come to an end; `effects.csv`, what each parameter does to that, written with the report;
-//! and in the folder of each run `run.json`, how far it has come. The folders know best: the table's
-//! column `state` follows them.
+//! A study in a folder. `study.json` describes it. `runs.csv` has a row for each run, made at the start, and its
+//! outputs once it ends. `effects.csv` has the effects of the parameters on the outputs, written with the report.
+//! `run.json` in the folder of each run has its progress. The folders are authoritative: the table's column `state`
+//! follows them.
 
 mod bootstrap;
 mod effects;
@@ -26,7 +26,7 @@ use text::write::replace_whole;
 pub const RECORD: &str = "study.json";
 /// Its runs.
 pub const TABLE: &str = "runs.csv";
-/// What each parameter does.
+/// Effects of the parameters.
 pub const EFFECTS: &str = "effects.csv";
 /// How far a run has come, in its folder.
 const RUN: &str = "run.json";

@@ -1,7 +1,7 @@
 //! `summary.json`: what was run, with what, at what cost, and how it ended.
 
 use crate::mesh_error::OfPhase;
-use crate::wanted::{Figure, Measured, Wanted};
+use crate::output_request::{Figure, Measured, OutputRequest};
 use indexmap::IndexMap;
 use law::BuiltLaw;
 use mechanics::group::Group;
@@ -104,7 +104,7 @@ pub(crate) struct Course {
 }
 
 impl Summary {
-    pub(crate) fn new(about: &About, wanted: &Wanted, simulation: &Simulation) -> Self {
+    pub(crate) fn new(about: &About, wanted: &OutputRequest, simulation: &Simulation) -> Self {
         let laws: Map<String, Value> = about
             .laws
             .iter()

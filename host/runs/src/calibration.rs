@@ -1,29 +1,29 @@
 //! Parameters of laws from measured curves: `pilum calibrate`.
 //!
-//! A calibration names drivers and cases with what was measured in them. [`run`] is the command: it
-//! looks for the values whose curves come nearest, by least squares from several starts, and says how
+//! A calibration names drivers and cases with what was measured in them. The command [`run`] looks
+//! for the values whose curves come nearest, by least squares from several starts, and reports how
 //! well the tests determine them.
 
-mod block;
+mod cache;
 mod coordinates;
 mod curve;
 mod derivatives;
 mod figures;
-mod files;
 mod fit;
 mod fitted;
-mod kept;
 mod least_squares;
+mod messages;
 mod misfit;
 mod model;
+mod output;
 mod page;
+mod parameter_block;
 mod profile;
 mod propagation;
 mod rates;
-mod reading;
+mod setup;
 mod statistics;
 mod systematic;
-mod words;
 
 pub use coordinates::Parameter;
 pub use curve::Curve;
@@ -36,13 +36,13 @@ pub use systematic::{Follow, Systematic};
 
 use crate::Error;
 use crate::variants::keep;
-use block::block;
 use fit::{Wish, fit};
 use fitted::fitted;
 use input::Kind;
 use input::calibration::{Calibration, Variance};
 use law::{Opener, Stop, Stopped};
 use model::{Model, Subject};
+use parameter_block::block;
 use propagation::Errors;
 use std::path::{Path, PathBuf};
 
@@ -99,7 +99,7 @@ pub struct Outcome {
 pub struct Interval {
     /// Its ends; `None` where absent, or none is known.
     pub ends: [Option<f64>; 2],
-    /// What becomes of an end that is `None`.
+    /// Meaning of an end that is `None`.
     pub open: [Open; 2],
     /// From the profile, else from the covariance.
     pub is_of_profile: bool,
@@ -202,7 +202,7 @@ pub fn run(
             say(&format!("variant {name}"));
         }
         let folder = options.folder(calibration);
-        files::refuse_run(&folder)?;
+        output::refuse_run(&folder)?;
         let was_there = folder.exists();
         let outcome = calibrate(calibration, &folder, options, say).inspect_err(|_| {
             // Nothing was found: a folder that has nothing in it goes.
@@ -210,8 +210,8 @@ pub fn run(
                 let _ = std::fs::remove_dir(&folder);
             }
         })?;
-        files::write(&outcome, calibration, &folder)?;
-        kept::remove(&folder);
+        output::write(&outcome, calibration, &folder)?;
+        cache::remove(&folder);
         show(&outcome.text());
         show(&format!("results in {}", folder.display()));
         show(&format!(
@@ -269,7 +269,7 @@ pub fn calibrate(
         .into(),
         Kind::Internal => error,
         _ => {
-            kept::remove(folder);
+            cache::remove(folder);
             error
         }
     })
@@ -315,7 +315,7 @@ fn carry_out(
             counted[parameter] = *u;
         }
         errors.add(model, &stage, &counted)?;
-        let of_stage = words::of_stage(model, &stage, &counted, wish.variance)?;
+        let of_stage = messages::of_stage(model, &stage, &counted, wish.variance)?;
         let name = |word: String| match groups.len() {
             1 => word,
             _ => format!("stage `{}`: {word}", group.name),
@@ -341,7 +341,7 @@ fn carry_out(
     };
     let places: Vec<(usize, usize)> = (0..model.parameters.len()).map(last).collect();
     if groups.len() > 1 {
-        words.extend(words::of_stages(model, &stages, &places, &errors));
+        words.extend(messages::of_stages(model, &stages, &places, &errors));
     }
     let (tests, of_tests) = fitted(model, &stages, &errors, &counted, wish)?;
     // What makes all the rest worth nothing comes first.

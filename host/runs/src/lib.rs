@@ -2,17 +2,17 @@
 //! watch over what laws do to the process.
 
 pub mod calibration;
-mod ending;
 #[expect(unsafe_code, reason = "the program's allocator")]
 #[cfg(unix)]
 pub mod memory;
 pub mod point;
 pub mod run;
+mod run_status;
 mod sampling;
 pub mod study;
 pub mod supervision;
 pub mod trade_off;
 pub mod variants;
 
-pub use ending::ending;
 pub use input::Error;
+pub use run_status::ending;

@@ -45,8 +45,8 @@ thread_local! {
 #[derive(Debug)]
 pub struct Allocator;
 
-/// Ends the process if there is no memory. Who does so already is given what was set aside, piece by piece: other
-/// threads go on until they need memory, and may be quicker.
+/// Ends the process if there is no memory. The thread that is ending it gets the memory set aside, piece by
+/// piece: other threads go on until they need memory, and may take it first.
 fn checked(size: usize, find: impl Fn() -> *mut u8) -> *mut u8 {
     let mut found = find();
     while found.is_null() {
@@ -94,9 +94,9 @@ pub fn reserve() {
     keep_freed();
 }
 
-/// Lets the system's allocator keep large pieces that are given back, for the next ones: memory that is new is
-/// given by the kernel page by page. glibc does so for pieces that are no larger than the largest one that was
-/// ever given back, up to 32 MB (`mallopt(3)`, `M_MMAP_THRESHOLD`); other allocators are not bothered by it.
+/// Lets the system's allocator keep large freed pieces for the next ones: the kernel gives new memory page by
+/// page. The allocator of glibc keeps pieces no larger than the largest one ever freed, up to 32 MB
+/// (`mallopt(3)`, `M_MMAP_THRESHOLD`). Other allocators are unaffected.
 fn keep_freed() {
     let Ok(layout) = Layout::array::<u8>(LARGEST_KEPT) else {
         return;
@@ -109,7 +109,7 @@ fn keep_freed() {
     }
 }
 
-/// What comes next, and how many bytes it takes next to what is in use.
+/// Announces what comes next, and how many bytes it takes in addition to those in use.
 pub(crate) fn expect(bytes: u64, what: &'static str) {
     EXPECTED.store(in_use().unwrap_or(0) + bytes, Ordering::Relaxed);
     if let Ok(mut doing) = DOING.lock() {

@@ -312,7 +312,7 @@ struct Guarded {
 
 impl Write for Guarded {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        law::custody::restore().map_err(io::Error::other)?;
+        law::process_state::restore().map_err(io::Error::other)?;
         check_own(&self.file, self.own, self.length)?;
         let n = self.file.write(bytes)?;
         self.length += n as u64;

@@ -1,7 +1,7 @@
 //! One run: from a case to a folder with results.
 
 use crate::Error;
-use crate::ending::{ending, process};
+use crate::run_status::{ending, process};
 use input::build::{Laws, Posed};
 use input::mesh::MeshFile;
 use input::{Case, Kind, probes};
@@ -12,8 +12,8 @@ use mechanics::group::{Group, PointFailure};
 use mechanics::settings::Method;
 use mechanics::simulation::{Increment, Part, PhaseRecord, Snapshot, Warning, When};
 use mechanics::{Place, Problem, Simulation, State, Watch};
+use results::output_request::OutputRequest;
 use results::pile::Resistances;
-use results::wanted::Wanted;
 use results::{Checkpoint, Fault, Figures, Recorder, report};
 use std::fmt::Write as _;
 use std::ops::ControlFlow;
@@ -142,7 +142,7 @@ fn was_said(warning: &Warning) -> bool {
 fn all_warnings(
     case: &Case,
     laws: &Laws,
-    (simulation, wanted): (&Simulation, &Wanted),
+    (simulation, wanted): (&Simulation, &OutputRequest),
     notes: Vec<String>,
 ) -> Vec<String> {
     let of_laws = laws.values().flat_map(|law| law.warnings.iter().cloned());
@@ -349,7 +349,7 @@ fn carry_out(
     Ok(results.figures().clone())
 }
 
-/// Whoever follows a simulation into its folder, and shows how it goes.
+/// Records a simulation in its folder, and shows how it goes.
 struct Follower<'a> {
     observer: &'a mut dyn Observer,
     results: Recorder,

@@ -1,17 +1,17 @@
 //! Many runs of one case: `pilum study`.
 //!
-//! A [`Plan`] is the study with the values of all its runs. [`Plan::prepare`] checks it and writes the
-//! table of runs; [`carry_out`] starts a process for each run, this many at a time; [`run_one`] is what
-//! such a process does, or one that whatever else distributes work has started. The folders of the
+//! A [`Plan`] is the study with the values of all its runs. Its [`prepare`](Plan::prepare) checks it
+//! and writes the table of runs. Then [`carry_out`] starts a process for each run, a number of them at
+//! a time. Such a process, or one started by another scheduler, calls [`run_one`]. The folders of the
 //! runs hold all results, so that any of these processes may be killed at any time.
 
-mod carry_out;
 mod design;
-mod one;
+mod execution;
+mod single_run;
 mod sobol;
 
-pub use carry_out::{Event, Jobs, carry_out};
-pub use one::{Once, follow, mend, run_one, stop_of_worker};
+pub use execution::{Event, Jobs, carry_out};
+pub use single_run::{Once, follow, mend, run_one, stop_of_worker};
 
 use crate::Error;
 use crate::run::{Ready, ready};
@@ -114,10 +114,9 @@ impl Plan {
         hexadecimal_sha256(parts.join("\n\0\n").as_bytes())
     }
 
-    /// Checks the values of all parameters, as far as that can be done without running anything: every
-    /// value that is listed is read, and the smallest and the largest number of each parameter, and what is
-    /// no number, are tried in a case with the first run's values of the others. Returns the record of the
-    /// study.
+    /// Checks the values of all parameters, as far as possible without running anything. Every listed value
+    /// is read. The smallest and the largest number of each parameter, and values that are not numbers, are
+    /// tried in a case with the first run's values of the others. Returns the record of the study.
     ///
     /// # Errors
     /// Bad input, at its place in the study or case file; trouble with a library.

@@ -1,11 +1,11 @@
-//! A law may end the process that calls it, in many ways: `exit`, a crash, a copy by `fork`. So the
-//! program is carried out by a child, a copy of itself made before it has any thread, and watches. What
-//! the child calls, what it has handed out and how it means to end is in memory that both share; a
-//! child that is gone without having said how it ends was ended by a law. Then the same is done once
-//! more with laws in separate processes ([`law::isolate`]), which names the point.
+//! A law may end the process that calls it, in many ways: `exit`, a crash, a copy by `fork`. So a
+//! child, a copy made before the program has any thread, does the work, and the program watches. Shared
+//! memory holds what the child calls, what it has handed out and how it means to end. If a child
+//! disappears without announcing its end, a law ended it. Then the same is done once more with laws in
+//! separate processes ([`law::isolate`]), which names the point.
 //!
-//! The watcher takes the signals; the child and its children are not reached by those of the
-//! terminal, and see a request to stop in the memory. One that does not answer is ended.
+//! The watcher takes the signals. Those of the terminal do not reach the child and its children,
+//! which see a request to stop in the memory. A child that does not answer is ended.
 //!
 //! | words of the memory | |
 //! |---|---|
@@ -30,7 +30,7 @@ pub use child::{begin_run, case_begun, end, end_run, is_again, stdout, stop, was
 pub use parent::supervise;
 
 #[cfg(target_os = "linux")]
-use law::{SharedMemory, calls};
+use law::{SharedMemory, current_call};
 
 /// Set to anything, the program does all in one process, for debuggers and profilers.
 pub const ALONE: &str = "PILUM_UNSUPERVISED";
@@ -70,7 +70,7 @@ const FOLDER_WORDS: usize = 513;
 #[cfg(target_os = "linux")]
 const CALLS: usize = FOLDER + FOLDER_WORDS;
 #[cfg(target_os = "linux")]
-const SIZE: usize = CALLS + calls::SIZE;
+const SIZE: usize = CALLS + current_call::SIZE;
 
 #[cfg(target_os = "linux")]
 /// The memory that both share.
@@ -88,10 +88,10 @@ impl Page {
     }
 
     fn folder(&self) -> String {
-        calls::read_text(&self.0, FOLDER, FOLDER_WORDS)
+        current_call::read_text(&self.0, FOLDER, FOLDER_WORDS)
     }
 
-    fn calls(&self) -> calls::Watched<'_> {
-        calls::Watched(&self.0, CALLS)
+    fn calls(&self) -> current_call::Watched<'_> {
+        current_call::Watched(&self.0, CALLS)
     }
 }

@@ -1,8 +1,8 @@
 //! Cost of accuracy: `pilum trade-off`.
 //!
-//! A study runs a driver or a case under many settings and measures each against a reference that
-//! is finer than all of them and says how far it is converged. [`run`] is the command;
-//! [`reach`] goes the other way round and finds settings for an error that is asked for.
+//! A study runs a driver or a case under many settings. It measures each against a reference that
+//! is finer than all of them, and reports how far the reference is converged. The command is
+//! [`run`]; [`reach`] goes the other way round and finds settings for a requested error.
 
 mod accuracy;
 mod case_study;
@@ -11,16 +11,16 @@ mod diagram;
 mod division;
 mod driver_study;
 mod expected;
-mod kept;
-mod pace;
 mod page;
 mod pareto;
+mod progress;
 pub(crate) mod sampled;
 mod scheme;
 mod stiffness;
 mod study;
 mod table;
 pub(crate) mod trial;
+mod trial_cache;
 
 pub use accuracy::{reach, reach_until, run_accurately};
 pub use sampled::Convergence;
@@ -30,11 +30,11 @@ use crate::Error;
 use crate::run::identity_of;
 use crate::variants::{keep, of_variant};
 use input::{Case, Driver, is_driver};
-use kept::Kept;
 use law::{Opener, Stop};
 use std::path::{Path, PathBuf};
 use text::write::replace;
 use trial::Scratch;
+use trial_cache::Kept;
 
 /// Settings of a study.
 #[derive(Clone, Debug)]

@@ -1,8 +1,8 @@
 //! `pilum run`: a case, or all variants of one, with a report of each and their comparison.
 
 use super::check_recording;
+use crate::output::{self, say};
 use crate::progress::Progress;
-use crate::say::{self, say};
 use crate::threads;
 use input::{Case, Error};
 use law::{Opener, Stop};
@@ -98,7 +98,7 @@ pub(super) fn run_cases(
     match (outcome, reports) {
         // What became of the run matters more than what became of its report.
         (Err(run), Err(report)) => {
-            say::error(&report);
+            output::error(&report);
             Err(run)
         }
         (outcome, reports) => outcome.and(reports),
@@ -149,7 +149,7 @@ fn folder_of(case: &Case, variant: Option<&str>, out: Option<&Path>) -> PathBuf 
 /// Keeps the last failure for the caller to report, and reports the one before it.
 fn keep_last(outcome: &mut Result<(), Error>, error: Error) {
     if let Err(earlier) = std::mem::replace(outcome, Err(error)) {
-        say::error(&earlier);
+        output::error(&earlier);
     }
 }
 

@@ -1,7 +1,7 @@
 //! `pilum study`: many runs of one case, or one of them.
 
 use super::cases::write_report;
-use crate::say::{print, say};
+use crate::output::{print, say};
 use indicatif::{ProgressBar, ProgressStyle};
 use input::Error;
 use law::{Opener, Stop};

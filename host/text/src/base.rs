@@ -7,7 +7,7 @@
 
 use crate::read::{deserialize_or, toml_error};
 use crate::setting::Setting;
-use crate::wording;
+use crate::toml_errors;
 use crate::{Error, Source};
 use serde::de::DeserializeOwned;
 use std::collections::HashMap;
@@ -185,10 +185,10 @@ fn with_settings<'i, T: DeserializeOwned>(
             let is_key_of_file = error.span().is_some_and(|span| of_file.contains(&span));
             let reworded = if is_key_of_file {
                 // Those are taken out before the rest is read.
-                wording::unknown_key(source, error, &["variant", "base"])
+                toml_errors::unknown_key(source, error, &["variant", "base"])
             } else {
                 let (name, _) = variant?;
-                wording::missing_key(source, error, &format!(" in variant `{name}`"))
+                toml_errors::missing_key(source, error, &format!(" in variant `{name}`"))
             };
             reworded.map(Error::from)
         })

@@ -1,23 +1,23 @@
 //! Files that people write, and the place of each mistake in them.
 //!
-//! A [`Source`] is a text with the files that it came from; [`parse`] turns it into values or an
-//! [`InputError`] that says file, line, key and what was expected; [`base`] lets files build on each
-//! other. Nothing here knows what the keys mean.
+//! A [`Source`] is a text with the files that it came from. The function [`parse`] turns it into
+//! values or an [`InputError`] with file, line, key and what was expected. With [`base`] files build
+//! on each other. Nothing here knows what the keys mean.
 
 pub mod base;
 mod error;
+mod error_display;
 pub mod file;
 mod read;
 mod setting;
-mod shown;
 mod source;
 mod suggest;
-mod wording;
+mod toml_errors;
 pub mod write;
 
 pub use error::{Error, add_hint};
+pub use error_display::shown;
 pub use read::{Named, deserialize, parse, toml_error};
 pub use setting::key;
-pub use shown::shown;
 pub use source::{InputError, Line, Source};
 pub use suggest::{nearest, suggestion};

@@ -1,6 +1,6 @@
 //! Reading TOML with the place of every error.
 
-use crate::wording;
+use crate::toml_errors;
 use crate::{Error, Source};
 use indexmap::IndexMap;
 use serde::de::DeserializeOwned;
@@ -55,13 +55,15 @@ fn choice_error<T: DeserializeOwned>(
     mut table: Spanned<DeTable<'_>>,
     error: &toml::de::Error,
 ) -> Option<Error> {
-    let span = error.span().filter(|_| wording::expects_choice(error))?;
+    let span = error
+        .span()
+        .filter(|_| toml_errors::expects_choice(error))?;
     let mut values = table.get_mut().iter_mut().map(|(_, value)| value);
     let value = value_at(&mut values, &span)?.get_mut();
-    let found = wording::value_in_words(value);
+    let found = toml_errors::value_in_words(value);
     *value = DeValue::String("".into());
     let refused = T::deserialize(toml::Deserializer::from(table)).err()?;
-    (refused.span()? == span).then(|| wording::no_choice(source, &refused, &found).into())
+    (refused.span()? == span).then(|| toml_errors::no_choice(source, &refused, &found).into())
 }
 
 /// The value at this place of the text.
@@ -87,7 +89,7 @@ fn value_at<'t, 'i: 't>(
 
 /// An error of the TOML reader, at its place.
 pub fn toml_error(source: &Source, error: &toml::de::Error) -> Error {
-    wording::reword(source, error).into()
+    toml_errors::reword(source, error).into()
 }
 
 /// TOML has `nan` and `inf`; no quantity here has such a value.

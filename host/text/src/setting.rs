@@ -5,7 +5,7 @@
 
 use crate::base::{merge_value, name};
 use crate::read::toml_error;
-use crate::wording::value_in_words;
+use crate::toml_errors::value_in_words;
 use crate::{Error, InputError, Source, suggestion};
 use std::ops::Range;
 use toml::Spanned;
@@ -14,7 +14,7 @@ use toml::de::{DeString, DeTable, DeValue};
 /// A setting that was read.
 #[derive(Debug)]
 pub(crate) struct Setting<'i> {
-    /// Where it stands.
+    /// Its place.
     range: Range<usize>,
     keys: Vec<Spanned<DeString<'i>>>,
     value: Spanned<DeValue<'i>>,

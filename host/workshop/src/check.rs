@@ -4,26 +4,26 @@
 //! process and be reported like any other fault. Checks are named, and a check is skipped when one
 //! that it builds on has not passed, so that a fault is reported by the check that names it.
 
-pub(crate) mod again;
+mod author_path;
 mod contract;
-mod course;
+mod coverage;
 mod crashed;
 mod description;
-mod extent;
 mod inputs;
 mod load;
+mod loading_path;
+mod location;
 mod margins;
 mod mathematics;
 mod memory;
-mod place;
 mod purity;
 mod random;
+pub(crate) mod recheck;
 mod report;
 mod response;
 mod robustness;
 mod routine;
 pub(crate) mod specimen;
-mod walk;
 
 use crate::Error;
 use abi::raw;
@@ -31,7 +31,7 @@ use law::adapter::{Adapter, Foreign};
 use law::capsule::Capsule;
 use law::child::{self, Ending, Work};
 use law::probe::NO_OUTCOME;
-use law::probe::kept::{self, KeptPhase, Phase};
+use law::probe::call_log::{self, KeptPhase, Phase};
 use law::{LoadedLaw, Opener, SearchPath, Trust, hexadecimal_sha256};
 use rayon::prelude::*;
 use report::{Finding, Outcome, Report, finding, json, list, text};
@@ -53,8 +53,8 @@ use text::write::replace;
     reason = "switches of the command line"
 )]
 pub struct Arguments {
-    /// A library, of the contract or of a UMAT with a sidecar next to it, with `--driver` of a UDSM or of MFront
-    /// behaviours too; or the id of a law that is found as `pilum laws` finds it.
+    /// A library: of the contract, of a UMAT with a sidecar next to it, or, with `--driver`, of a UDSM or MFront
+    /// behaviours; or the id of a law, found as by `pilum laws`.
     #[arg(required_unless_present = "list")]
     library: Option<String>,
     /// Write JSON.
@@ -164,7 +164,7 @@ fn checks() -> impl Iterator<Item = &'static Check> {
         mathematics::CHECKS,
         response::CHECKS,
         inputs::CHECKS,
-        extent::CHECKS,
+        coverage::CHECKS,
         routine::CHECKS,
     ]
     .into_iter()
@@ -313,7 +313,7 @@ impl Subject {
         let of_driver = self
             .driver
             .as_ref()
-            .and_then(|driver| course::foreign(&self.opener, driver));
+            .and_then(|driver| author_path::foreign(&self.opener, driver));
         Some(Foreign {
             in_process: true,
             record: None,
@@ -382,7 +382,7 @@ pub fn run(
         let internal = |error: std::io::Error| Error::internal(error.to_string());
         child::enter().map_err(internal)?;
         if let Some(kept) = &arguments.kept {
-            kept::keep_in(std::fs::File::create(kept).map_err(internal)?);
+            call_log::keep_in(std::fs::File::create(kept).map_err(internal)?);
         }
         if let Some(kept) = &arguments.tell {
             return crashed::tell(&Subject::new(arguments, opener, &path), kept);
@@ -398,7 +398,7 @@ pub fn run(
                 None => print(&format!("\n{ANSWER}{answer}\n")),
             }
             // What is left is the end of the process.
-            kept::keep_phase(KeptPhase::new(Phase::Exit, false)).map_err(internal)?;
+            call_log::keep_phase(KeptPhase::new(Phase::Exit, false)).map_err(internal)?;
         }
         return Ok(());
     }
@@ -534,7 +534,7 @@ fn library_path(name: &str) -> Result<PathBuf, Error> {
         })
 }
 
-/// What is asked of `--set` before the checks: no check of the library.
+/// Requirement on `--set` before the checks: not a check of the library.
 static SETTINGS: Check = Check {
     id: "settings-fit",
     family: Family::Description,
@@ -543,13 +543,13 @@ static SETTINGS: Check = Check {
     run: specimen::settings_fit,
 };
 
-/// What is asked of `--driver` before the checks.
+/// Requirement on `--driver` before the checks.
 static DRIVER: Check = Check {
     id: "driver-fits",
     family: Family::Description,
     description: "The driver can be read, and leads a law of the library.",
     needs: &[],
-    run: course::driver_fits,
+    run: author_path::driver_fits,
 };
 
 /// Checks of what is asked for, none of the library.
@@ -566,7 +566,7 @@ fn refuse_driver(
     let finding = in_child(&DRIVER, arguments, path, &ScratchFolder::new()?)?;
     match finding.outcome {
         // Once more here, with the place in the file.
-        Outcome::Warning => course::read(opener, driver).map(drop),
+        Outcome::Warning => author_path::read(opener, driver).map(drop),
         Outcome::Failed => Err(Error::usage(finding.details)),
         _ => Ok(()),
     }

@@ -1,8 +1,8 @@
 //! `pilum new-law`: a small project for a law, in the author's language, that builds and runs.
 //!
-//! The templates are files in `new_law/`, complete laws called `my_law`; what they need of the
-//! contract is carried by the program ([`abi::sources`]), so that a project depends on nothing else,
-//! no registry and no installation, and stays with the version that it was written for.
+//! The templates are files in `new_law/`, complete laws called `my_law`. The program carries what
+//! they need of the contract ([`abi::sources`]). So a project depends on nothing else, neither a
+//! registry nor an installation, and stays with the version that it was written for.
 
 use crate::Error;
 use abi::sources::{self, CPP_HEADER, HEADER, MODULE, POINT_HEADER};

@@ -27,7 +27,7 @@ pub struct NewSidecar {
     /// plane, in space).
     #[arg(long, value_name = "N,…", value_delimiter = ',', default_values_t = [4, 6])]
     ntens: Vec<u32>,
-    /// Name of the routine, if it is none of `umat_`, `umat`, `UMAT`, `UMAT_`.
+    /// Name of the routine, if not `umat_`, `umat`, `UMAT` or `UMAT_`.
     #[arg(long)]
     symbol: Option<String>,
     /// The file to write; there must be none yet [default: NAME.law.toml next to libNAME.so].

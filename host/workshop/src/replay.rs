@@ -5,7 +5,7 @@ pub(crate) mod library;
 pub(crate) mod probed;
 
 use crate::Error;
-use crate::check::again;
+use crate::check::recheck;
 use abi::status::Outcome;
 use law::capsule::{Capsule, LibraryCapsule, OutcomePart, status};
 use law::{
@@ -46,7 +46,7 @@ pub fn replay(path: &Path, opener: &Opener, say: &mut dyn FnMut(&str)) -> Result
     let loaded = find(&capsule, opener)?;
     repeat(&capsule, &loaded, say)?;
     // The call succeeds: whether that is what a check has found wrong is for the check to say.
-    again::ask(path, &capsule, (loaded.library().path(), opener), say)
+    recheck::ask(path, &capsule, (loaded.library().path(), opener), say)
 }
 
 /// Repeats the call with this law.

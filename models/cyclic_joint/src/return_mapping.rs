@@ -7,7 +7,7 @@ use abi::{Failure, InterfaceResponse};
 
 /// Newton's method takes a handful of iterations, one for each bit next to a double root.
 const MAX_ITERATIONS: usize = 200;
-/// What is left of g over `|τ*|`.
+/// Residual of g over `|τ*|`.
 const CONVERGED: f64 = 1e-11;
 
 /// A joint in contact over its part of the increment.
@@ -125,9 +125,9 @@ impl CyclicJoint {
         (share < 1.0).then(|| -self.contraction_slip * (-share).ln_1p())
     }
 
-    /// The root of Eq. (6), none if contraction uses up the normal stress before. Where `σ_n ≥ 0`, g is
-    /// concave; it starts above zero, so that Newton's method comes down to its only root from any
-    /// point beyond.
+    /// The root of Eq. (6); `None` if contraction uses up the normal stress before. For `σ_n ≥ 0`, g is
+    /// concave and starts above zero, so that Newton's method descends to its only root from any point
+    /// beyond.
     ///
     /// # Errors
     /// A smaller increment is asked for where rounding hides the root.

@@ -145,8 +145,8 @@ impl Path<'_> {
     }
 
     /// Eq. (E): the mean of the rates at the start and at the end of a step forward, then back to
-    /// the surface; half the difference is the error. Where `σ_n` is down to `nearly_lost`, a step
-    /// may lose contact.
+    /// the surface; half the difference is the error. If `σ_n` is down to `nearly_lost`, a step may
+    /// lose contact.
     fn modified_euler(
         &self,
         from: &Sliding,

@@ -1,9 +1,9 @@
 //! Principal stresses and the way to their axes and back.
 //!
 //! The in-plane problem has a closed form: with the centre `m` and the radius `r` of Mohr's circle
-//! the principal stresses are `m ± r`, and all that is needed of the angle `θ` of the first axis
-//! is `cos 2θ` and `sin 2θ`, ratios of `r`. The spatial problem is solved by Jacobi rotations,
-//! which keep repeated and nearly repeated values accurate and their axes orthonormal.
+//! the principal stresses are `m ± r`. The angle `θ` of the first axis enters only by `cos 2θ` and
+//! `sin 2θ`, which are ratios to `r`. The spatial problem is solved by Jacobi rotations, which keep
+//! repeated and nearly repeated values accurate and their axes orthonormal.
 
 use nalgebra::{Matrix3, Matrix6, Vector3};
 

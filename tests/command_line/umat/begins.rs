@@ -56,7 +56,7 @@ fn routines_that_begin_once_are_not() {
     }
 }
 
-/// What is kept from call to call shows when the same call is made twice after another step.
+/// The same call, made again after another step, shows data kept from call to call.
 #[test]
 fn a_step_kept_from_the_last_call_is_named() {
     let Some(place) = place("begins") else {

@@ -131,7 +131,7 @@ fn each_mistake_is_called_by_its_name() {
     }
 }
 
-/// What is written beyond an array is told in a run, too.
+/// A run, too, reports writing beyond an array.
 #[test]
 fn a_run_tells_what_is_written_beyond_an_array() {
     let Some(place) = place("planted") else {
@@ -173,7 +173,7 @@ fn a_stop_far_away_is_a_failure_of_one_check() {
     assert_ne!(found, "skipped", "{details}");
 }
 
-/// Parameters that make everything elastic are told of, since all else passes.
+/// Parameters that make everything elastic are reported, since all else passes.
 #[test]
 fn paths_that_never_yield_are_told_of() {
     let Some(place) = place("planted") else {

@@ -1,4 +1,4 @@
-//! What can be reported of a routine before it is run in earnest: `inspect`, `new-sidecar`, `laws`, `check`.
+//! Reports on a routine before it is run in earnest: `inspect`, `new-sidecar`, `laws`, `check`.
 
 use super::{BAD_INPUT, DONE, PLUGIN_TROUBLE, Place, number, place, rows};
 use crate::program::Outcome;
@@ -389,7 +389,7 @@ fn a_routine_that_gives_up_far_away_is_checked_nearby() {
     }
 }
 
-/// How a routine has ended its process is told once, with the checks that it has ended.
+/// The way a routine ends its process is reported once, with the checks that it ended.
 #[test]
 fn what_ends_many_checks_is_told_once() {
     let Some(place) = place("stops") else {

@@ -1,10 +1,10 @@
 //! Routines whose DDSDDE is not the derivative of their stress: noticed, and made up for.
 //!
-//! Goal        whatever a routine writes as its tangent, a case comes to the same equilibria by default
+//! Goal        whatever a routine writes as its tangent, a case comes to the same equilibria by default.
 //! Set-up      the chamber, most of it on a coarse mesh: hypoplastic sand that gives L, L + N D/|D| or differences; a
-//!             Mohr–Coulomb routine whose DDSDDE is exact, 2 % off at edges, transposed or elastic
+//!             Mohr–Coulomb routine whose DDSDDE is exact, 2 % off at edges, transposed or elastic.
 //! Asserts     all increments; the loads of the exact tangent; iterations; one line about it; nothing is reported
-//!             of laws with consistent tangents; the same bits after a stop
+//!             of laws with consistent tangents; the same bits after a stop.
 
 use super::tolerance::summary;
 use super::{gfortran, number, place, source};

@@ -1,6 +1,6 @@
-//! A behaviour's call for one point. Programs of this interface call point by point, so what a call
-//! does next to the law's update is counted: sizes are constants, nothing is filled that is not read,
-//! and what goes wrong is told out of the way.
+//! A behaviour's call for one point. Programs with this interface call point by point, so the
+//! overhead of a call is kept small. Sizes are constants, only what is read is filled, and failures
+//! are reported out of line.
 
 use super::{MOST_STATES, Settings, has_axes, n_properties};
 use crate::laws::{Laws, has_default, tell};

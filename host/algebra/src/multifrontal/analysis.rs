@@ -394,8 +394,8 @@ impl Analysis {
         (self.sources, self.targets) = (sources, targets);
     }
 
-    /// Entries in the columns of the pivots of a front: which of the pivots, the position of the entry in the pattern, and
-    /// the position of its row. If the matrix is symmetric, those of the lower half only.
+    /// Entries in the columns of the pivots of a front: which of the pivots, the position of the entry in the pattern,
+    /// and the position of its row. If the matrix is symmetric, those of the lower half only.
     fn entries_of(
         &self,
         shape: &Shape,

@@ -1,12 +1,12 @@
 //! Nested dissection of a mesh by its own lines: an order of elimination with little fill.
 //!
-//! A set of unknowns is cut along the mesh line that halves it across its longer side; the
-//! unknowns on the line are eliminated after those on both sides, which do not touch each other
-//! (George 1973). The cuts affect speed only: any order gives a correct factorisation.
+//! A set of unknowns is cut along the mesh line that halves it across its longer side. The unknowns on the line are
+//! eliminated after those on both sides, which are not coupled (George 1973). The cuts affect speed only: any order
+//! gives a correct factorisation.
 
 use std::cmp::Ordering;
 
-/// Sets within so few mesh lines each way are not cut any more.
+/// Sets that extend over no more mesh lines than this each way are not cut.
 const SMALLEST: u32 = 4;
 /// Unknowns from which on both sides of a cut are worth a thread each.
 const WORTH_SHARING: usize = 10_000;

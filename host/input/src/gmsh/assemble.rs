@@ -18,7 +18,7 @@ type Ends = [usize; 2];
 
 /// Largest coordinate, m.
 const FARTHEST: f64 = 1e9;
-/// Lengths within this fraction of the mesh's size are none.
+/// Lengths within this fraction of the mesh's size count as zero.
 const NOTHING: f64 = 1e-9;
 /// Names that a note lists.
 const MOST_NAMES: usize = 20;

@@ -1,4 +1,4 @@
-//! What a file is: the version and encoding of its format, or what else it is.
+//! The version and encoding of a file's format, or the kind of another file.
 
 use super::cursor::{Cursor, Encoding, Fault};
 
@@ -13,13 +13,13 @@ pub(super) enum Version {
     FourOne,
 }
 
-/// What makes a file of any other version into one that is read.
+/// The command that converts a file of any other version.
 const CONVERT: &str = "`gmsh old.msh -save -format msh41 -o new.msh` writes it in version 4.1";
 
 /// Reads until the end of the section that says the format. Remarks may come before it.
 ///
 /// # Errors
-/// What the file is instead.
+/// The kind of another file.
 pub(super) fn read(cursor: &mut Cursor<'_>) -> Result<Version, Fault> {
     if cursor.begins_with("version https://git-lfs.github.com/") {
         let message = "the file is a pointer of Git LFS, and the mesh itself is not here: `git lfs pull` \

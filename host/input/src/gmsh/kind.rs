@@ -23,7 +23,7 @@ impl Kind {
     /// The type with this number.
     ///
     /// # Errors
-    /// What it is instead, and what is read.
+    /// The name of another kind, and the kinds that are read.
     pub(super) fn of(number: i64) -> Result<Self, String> {
         let name = match number {
             15 => return Ok(Self::Point),

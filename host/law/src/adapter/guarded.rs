@@ -1,7 +1,7 @@
 //! Arguments of a routine in one block of words, apart from each other by guard words.
 //!
-//! What a routine may not write is compared after each call with what it was given, guard words with what they
-//! hold: so its damage is found where it is done, and not in the results of another argument.
+//! After each call, read-only arguments are compared with what was handed over, and guard words with what they
+//! held. So damage is found where it is done, and not in the results of another argument.
 
 use super::Refusal;
 use abi::raw;
@@ -10,8 +10,8 @@ use std::sync::{Mutex, PoisonError};
 
 /// Guard words on each side of an argument.
 const N_GUARD: usize = 24;
-/// Guard words on each side of an array of results: a number of a state variable that is wrong, or a DDSDDE of six
-/// components where there is room for four, ends in them, and not in the next array.
+/// Guard words on each side of an array of results. A wrong number of a state variable, or a DDSDDE of six
+/// components where there is room for four, ends in them and not in the next array.
 const N_WIDE: usize = 256;
 /// What guard words hold: a signalling NaN. A read shows in the results. A computed value that is
 /// written back shows in the word, since every operation makes it a quiet NaN.
@@ -333,7 +333,7 @@ impl<const N: usize> Blocks<N> {
         Some(gap.map_or_else(String::new, |gap| self.template.place(gap)))
     }
 
-    /// Makes calls with a block of their own.
+    /// Makes calls with a block that no other call uses.
     pub(super) fn with<T>(&self, calls: impl FnOnce(&mut Block<N>) -> T) -> T {
         let unused = || self.unused.lock().unwrap_or_else(PoisonError::into_inner);
         let one = unused().pop();

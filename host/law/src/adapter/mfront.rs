@@ -16,9 +16,9 @@ use crate::Error;
 use crate::description::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription, Tangent,
 };
-use crate::image::Image;
 use crate::library::mfront::{Behaviour, Point, Sizes};
 use crate::library::{Call, CallFailure};
+use crate::library_bytes::Image;
 use abi::Hypothesis;
 use abi::raw::{self, Status};
 use std::f64::consts::SQRT_2;
@@ -37,7 +37,7 @@ const CONSISTENT_OPERATOR: f64 = 4.0;
 /// Describes the behaviours of a library. Nothing of it runs.
 ///
 /// # Errors
-/// [`Error::Library`] if it has none.
+/// [`Error::Library`] if it cannot be read or has no behaviour.
 pub(super) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Error> {
     let path = &foreign.library;
     let fault = |why: String| Error::library(format!("library {} {why}", path.display()));

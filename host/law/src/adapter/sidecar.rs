@@ -1,4 +1,4 @@
-//! The sidecar of a library that cannot describe itself: `NAME.law.toml` beside `libNAME.so`.
+//! The sidecar of a library that cannot describe itself: `NAME.law.toml` next to `libNAME.so`.
 
 use super::{Externals, Order, Scratch};
 use crate::Error;

@@ -17,9 +17,9 @@ use crate::Error;
 use crate::description::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription, Tangent,
 };
-use crate::image::Image;
 use crate::library::udsm::{N_ARGUMENTS, Routine};
 use crate::library::{Call, CallFailure};
+use crate::library_bytes::Image;
 use abi::Hypothesis;
 use abi::raw::{self, Status};
 use std::path::{Path, PathBuf};
@@ -41,7 +41,7 @@ const MOST_STATES: i32 = 1000;
 /// Stress along the axes that a plane problem lacks, relative to the largest, that is rounding.
 const OUT_OF_PLANE: f64 = 1e-9;
 
-/// What `User_Mod` is asked for.
+/// Tasks of `User_Mod`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Task {
     Initialise = 1,

@@ -10,9 +10,9 @@ use super::{
     Refusal, each_point, time_of_call,
 };
 use crate::Error;
-use crate::image::Image;
 use crate::library::umat::{N_ARGUMENTS, Routine};
 use crate::library::{Call, CallFailure};
+use crate::library_bytes::Image;
 use abi::Hypothesis;
 use abi::raw::{self, Status};
 use std::fmt::Write as _;
@@ -156,9 +156,9 @@ impl ForeignLaw for Umat {
 /// Numbers of components.
 #[derive(Clone, Copy, Debug)]
 struct Sizes {
-    /// Of the hypothesis.
+    /// Components of the hypothesis.
     n: usize,
-    /// Of the call: NTENS.
+    /// Components of the call: NTENS.
     n_tens: usize,
     /// NDI.
     n_normal: usize,

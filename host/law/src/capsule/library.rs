@@ -4,7 +4,7 @@
 use super::{Made, OutcomePart, place, text};
 use crate::Error;
 use crate::adapter::{Adapter, Externals, Foreign, Order};
-use crate::library::probe::kept::{KeptPhase, Phase};
+use crate::library::probe::call_log::{KeptPhase, Phase};
 use indexmap::IndexMap;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};

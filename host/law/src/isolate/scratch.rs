@@ -1,5 +1,5 @@
-//! Folders in which routines leave what they write next to their results: each worker of a law works
-//! in one of its own.
+//! Folders for files that routines write in addition to their results: each worker of a law has a
+//! separate one.
 
 use super::printed::say;
 use std::io;

@@ -144,7 +144,8 @@ unsafe extern "C" fn getjobname_(name: *mut c_char, length: *mut c_int, n: usize
 /// The working directory of the program, where that of the routine is another.
 static OUTDIR: OnceLock<PathBuf> = OnceLock::new();
 
-/// The routine gets a working directory of its own from now on; `GETOUTDIR` keeps this one.
+/// `GETOUTDIR` keeps returning this folder; from now on the routine has a separate working
+/// directory.
 #[cfg(unix)]
 pub(crate) fn out_dir_is(folder: PathBuf) {
     let _ = OUTDIR.set(folder);

@@ -171,7 +171,8 @@ pub(super) fn trap(missing: &Missing) -> Result<(), String> {
 fn load_traps(library: &[u8]) -> Result<(), String> {
     use std::os::fd::AsRawFd;
     let failed = |why: &dyn std::fmt::Display| format!("its traps cannot be loaded: {why}");
-    let mut memory = super::super::image::memory_file("pilum_traps").map_err(|why| failed(&why))?;
+    let mut memory =
+        super::super::library_bytes::memory_file("pilum_traps").map_err(|why| failed(&why))?;
     memory.write_all(library).map_err(|why| failed(&why))?;
     let path = format!("/proc/self/fd/{}", memory.as_raw_fd());
     // SAFETY: it is made here and has no initialisers.

@@ -1,6 +1,6 @@
 //! Opening a library with behaviours of MFront's generic interface, and calling one.
 
-use super::super::image::Image;
+use super::super::library_bytes::Image;
 use std::ffi::{CStr, CString, c_char, c_int};
 use std::path::Path;
 use std::ptr::null_mut;

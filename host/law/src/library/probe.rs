@@ -2,7 +2,7 @@
 //! protection are chosen, and with arguments that a host in earnest never gives. All that a caller
 //! hands over and gets back is safe.
 
-pub mod kept;
+pub mod call_log;
 mod pages;
 pub mod process;
 
@@ -13,7 +13,7 @@ use abi::Hypothesis;
 use abi::raw::{self, Batch, Host, Instance, MagicBlock, Rates, Status, View, ViewMut};
 use abi::status::most_severe;
 use abi::version;
-use kept::{Function, KeptCall, KeptPhase, Phase};
+use call_log::{Function, KeptCall, KeptPhase, Phase};
 pub use pages::Fence;
 use pages::Pages;
 use serde::{Deserialize, Serialize};
@@ -98,7 +98,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// The message up to its NUL; `None` if it has none.
+    /// The message up to its NUL; `None` without a NUL.
     pub fn text(&self) -> Option<String> {
         terminated(&self.message)
     }
@@ -331,7 +331,7 @@ impl Drop for Probe {
     fn drop(&mut self) {
         if let Held::Own(_) = self.instance {
             // `destroy` is called all the same if that cannot be written.
-            let _ = kept::keep(|| {
+            let _ = call_log::keep(|| {
                 let names = (self.id.as_str(), self.hypothesis.name());
                 KeptCall::new(names, Function::Destroy, Form::of(0), &self.values, &[])
             });
@@ -362,7 +362,7 @@ pub struct CreateForm<'a> {
     pub lacks_tangent: bool,
 }
 
-/// What `create` has left behind.
+/// Result of `create`.
 #[derive(Debug)]
 pub struct Created {
     /// What it returned.
@@ -374,7 +374,7 @@ pub struct Created {
 }
 
 impl Created {
-    /// The message up to its NUL; `None` if it has none.
+    /// The message up to its NUL; `None` without a NUL.
     pub fn text(&self) -> Option<String> {
         terminated(&self.message)
     }
@@ -435,7 +435,7 @@ pub(crate) fn create(id: &str, law: LawHandle, form: &CreateForm<'_>) -> io::Res
     let message = message_buffer(form.message)?;
     let mut instance: *mut Instance = null_mut();
     let all = form.values.unwrap_or_default();
-    kept::keep(|| {
+    call_log::keep(|| {
         let names = (id, form.hypothesis.name());
         KeptCall::new(names, Function::Create, Form::of(0), all, &[])
     })?;
@@ -480,7 +480,7 @@ pub(crate) fn create_foreign(
     form: &CreateForm<'_>,
 ) -> io::Result<Created> {
     let values = form.values.unwrap_or_default();
-    kept::keep(|| {
+    call_log::keep(|| {
         let names = (id, form.hypothesis.name());
         KeptCall::new(names, Function::Create, Form::of(0), values, &[])
     })?;
@@ -518,7 +518,7 @@ pub(crate) fn destroy_nothing(id: &str, law: LawHandle) {
     if let Some(destroy) = law.known.destroy {
         let law = Some(id.to_owned());
         // It is called all the same if that cannot be written.
-        let _ = kept::keep_phase(KeptPhase {
+        let _ = call_log::keep_phase(KeptPhase {
             law,
             ..KeptPhase::new(Phase::DestroyNull, false)
         });
@@ -754,7 +754,7 @@ impl Probe {
             rates: given.as_ref().map_or(null(), std::ptr::from_ref),
         };
         let letter = in_pages(&batch, form.batch_bytes)?;
-        kept::keep(|| {
+        call_log::keep(|| {
             let names = (self.id.as_str(), self.hypothesis.name());
             KeptCall::new(names, function, *form, &self.values, starts)
         })?;
@@ -797,7 +797,7 @@ impl Probe {
         form: &Form,
     ) -> io::Result<Option<Answer>> {
         let rows = Strided::rows(self.n_components);
-        kept::keep(|| {
+        call_log::keep(|| {
             let names = (self.id.as_str(), self.hypothesis.name());
             KeptCall::new(names, Function::InitState, *form, &self.values, starts)
         })?;
@@ -866,7 +866,7 @@ impl Probe {
         let request = self.asked(form);
         let wants_tangent = request & (raw::PILUM_REQ_TANGENT | raw::PILUM_REQ_ELASTIC) != 0;
         let rows = Strided::rows(c);
-        kept::keep(|| {
+        call_log::keep(|| {
             let names = (self.id.as_str(), self.hypothesis.name());
             KeptCall::new(names, function, *form, &self.values, starts)
         })?;
@@ -994,7 +994,7 @@ pub fn open(path: &Path) -> Result<(), String> {
 
 /// Notes what is about to be done with a library that is loaded from its file.
 fn begin(phase: Phase) -> Result<(), String> {
-    kept::keep_phase(KeptPhase::new(phase, true)).map_err(|error| error.to_string())
+    call_log::keep_phase(KeptPhase::new(phase, true)).map_err(|error| error.to_string())
 }
 
 /// The library, never unloaded.

@@ -1,6 +1,6 @@
 //! Opening a library with a user-defined soil model of PLAXIS, and calling it.
 
-use super::super::image::Image;
+use super::super::library_bytes::Image;
 use super::umat::open_private;
 use std::ffi::{c_char, c_int, c_void};
 use std::path::Path;
@@ -47,8 +47,8 @@ fn spellings(name: &str) -> [String; 6] {
 }
 
 impl Routine {
-    /// Opens another image of the library, with variables of its own. Where `traps` are wanted,
-    /// they stand for what it calls and nobody supplies.
+    /// Opens another image of the library, with separate variables. With `traps`, functions that it
+    /// calls and nobody supplies become traps.
     ///
     /// # Errors
     /// The defect of the library, in words.

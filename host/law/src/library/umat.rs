@@ -1,6 +1,6 @@
 //! Opening a library with an Abaqus user subroutine, and calling it.
 
-use super::super::image::Image;
+use super::super::library_bytes::Image;
 use std::ffi::c_void;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -25,12 +25,12 @@ pub(crate) struct Routine {
 }
 
 impl Routine {
-    /// Opens another image of the library, with variables (`SAVE`, `COMMON`) of its own, and finds
-    /// the routine by the first of the names it has. Where `traps` are wanted, they stand for what
-    /// it calls and nobody supplies.
+    /// Opens another image of the library, with separate variables (`SAVE`, `COMMON`), and finds
+    /// the routine by the first of `names` that it has. With `traps`, functions that it calls and
+    /// nobody supplies become traps.
     ///
     /// # Errors
-    /// What is wrong with the library, in words.
+    /// The defect of the library, in words.
     pub(crate) fn open(
         path: &Path,
         image: Image,
@@ -73,11 +73,11 @@ impl Routine {
     }
 }
 
-/// Opens another image of a library, with variables (`SAVE`, `COMMON`) of its own. Where `traps` are
-/// wanted, they stand for what it calls and nobody supplies.
+/// Opens another image of a library, with separate variables (`SAVE`, `COMMON`). With `traps`,
+/// functions that it calls and nobody supplies become traps.
 ///
 /// # Errors
-/// What is wrong with the library, in words.
+/// The defect of the library, in words.
 pub(super) fn open_private(
     path: &Path,
     image: Image,
@@ -131,8 +131,8 @@ fn supply(_: &Path, _: &str, traps: bool, why: String) -> Result<libloading::Lib
     })
 }
 
-/// Loads the hashed bytes once more. Where that fails (no files in memory, a library that looks
-/// for others next to itself) the file itself is loaded, which gives the same image every time: a
+/// Loads the hashed bytes once more. If that fails (no files in memory, a library that looks for
+/// others next to itself), the file itself is loaded. That gives the same image every time, so a
 /// second one is refused.
 ///
 /// # Safety

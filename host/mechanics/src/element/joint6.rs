@@ -62,9 +62,9 @@ impl Side {
         }
     }
 
-    /// Directions at the nodes of the arc through them. Those of the element's own curve are off by 2·10⁻³ at the ends of
-    /// an arc of 22°, and others in the element that follows. At an end the arc is turned from the chord to the middle
-    /// by as much as that one is from the chord of the other half.
+    /// Directions at the nodes of the arc through them. Those of the element's own curve are off by 2·10⁻³ at the ends
+    /// of an arc of 22°, and others in the element that follows. At an end the arc is turned from the chord to the
+    /// middle by as much as that one is from the chord of the other half.
     fn along_arc(&self) -> [[f64; 2]; 3] {
         let [a, b, m] = self.at;
         let to = |from: [f64; 2], to: [f64; 2]| [to[0] - from[0], to[1] - from[1]];

@@ -1,34 +1,33 @@
 //! Strains that are not those at the points where the law is evaluated.
 //!
-//! With few points an element follows plastic and incompressible flow without locking. But few
-//! points do not integrate terms with the radius exactly: stresses in equilibrium with a weight
-//! would leave nodal forces. Here the law's points q carry functions ψ_q, one at their own
-//! point and zero at the others, made of 1, x, y, and of quads ξη (so where sides are straight, bilinear
-//! between the 2 × 2 points of a quad, linear between the 3 of a triangle), and the stress of the element is
+//! With few points an element follows plastic and incompressible flow without locking. But few points do not integrate
+//! terms with the radius exactly: stresses in equilibrium with a weight would leave nodal forces. Therefore each of the
+//! law's points q has a function ψ_q, which is one there and zero at the other points. The ψ_q span 1, x, y, and in
+//! quads also ξη. With straight sides they are bilinear between the 2 × 2 points of a quad and linear between the 3 of
+//! a triangle. The stress of the element is
 //!
 //! - σ(x) = Σ_q ψ_q(x) σ_q (1)
 //!
-//! Its nodal forces are integrated with as many points as that takes. The strains that belong to them are
-//! mean values,
+//! Its nodal forces are integrated with enough points to be exact. The conjugate strains are mean values,
 //!
 //! - ε_q = ∫ ψ_q B dV u / W_q, W_q = ∫ ψ_q dV (2)
 //!
-//! so that Σ_q W_q σ_q · ε_q = ∫ σ · B dV u: the virtual work of (1). (1) contains every stress that is
-//! linear in the coordinates, on curved sides too, so that weight and earth pressure at rest balance to
-//! round-off. In plane strain, and in rectangles, (2) is the strain at the point itself.
+//! so that Σ_q W_q σ_q · ε_q = ∫ σ · B dV u, the virtual work of (1). Every stress that is linear in the coordinates
+//! has the form (1), also with curved sides. So weight and earth pressure at rest balance to round-off. In plane
+//! strain, and in rectangles, (2) is the strain at the point itself.
 //!
-//! A quad with four functions has one motion that none of (2) sees. Where sides are bent, stresses whose directions turn with
-//! the side do work in it, so that a free wall moves to and fro: there are three points along such sides, functions ξᵃηᵇ
-//! for them, and a linear volume strain.
+//! A quad with four functions has one motion without strains (2). With bent sides, stresses whose directions turn with
+//! the side do work in it, and a free wall moves to and fro. Quads therefore have three points along bent sides,
+//! functions ξᵃηᵇ to match, and a linear volume strain.
 
 use super::Axes;
 use super::solid::Point;
 
-/// A pivot below this: the points of an element do not tell functions of size 1 apart.
+/// With a pivot below this the points of an element do not distinguish functions of size 1.
 const SINGULAR: f64 = 1e-9;
 
-/// Gives points the mean strains (2). `fine`: points that integrate exactly; `value`: ψ of a point at one
-/// of them. `None` if a point stands for no volume.
+/// Gives points the mean strains (2). `fine`: points of an exact rule; `value`: ψ of a point at one of them. `None` if
+/// a point has no volume.
 pub(super) fn project<const N: usize>(
     points: &mut [Point<N>],
     fine: &[Point<N>],
@@ -59,13 +58,13 @@ pub(super) fn project<const N: usize>(
     Some(())
 }
 
-/// Values at some places of the functions that are one at their own point and zero at the others, place by
-/// place: a sum of as many given functions, whose values at the points (`own`) and at the places (`fine`)
-/// are known. `None` if the points do not tell them apart.
+/// Values of the cardinal functions (one at their own point, zero at the others) at some places, place by place. They
+/// are sums of given functions, one per point, with known values at the points (`own`) and at the places (`fine`).
+/// `None` if the points do not distinguish these.
 pub(super) fn cardinal(own: &[Vec<f64>], fine: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
     let n = own.len();
-    // Σ_q ψ_q(x) φ_k(x_q) = φ_k(x): rows k, a column for each point, then one for each place. Coordinates
-    // are taken from the first point, in parts of the farthest one's.
+    // Σ_q ψ_q(x) φ_k(x_q) = φ_k(x): rows k, a column for each point, then one for each place. Coordinates are relative
+    // to the first point and scaled by the farthest one.
     let moved = |values: &[f64], k: usize| match k {
         1 | 2 => {
             let away = own.iter().map(|at| (at[k] - own[0][k]).abs());
@@ -108,8 +107,8 @@ pub(super) fn linear_volume_strain<const N: usize>(points: &[Point<N>], strains:
     even_out(&Linear::new(points), strains);
 }
 
-/// Stresses whose nodal forces at the points' own strains are those of `stresses` at the strains above:
-/// σ + (p̂ − p), with p the mean normal stress.
+/// Stresses σ + (p̂ − p), with p the mean normal stress. Their nodal forces by B are those of `stresses` by the B̄
+/// above.
 pub(super) fn linear_volume_stress<const N: usize>(points: &[Point<N>], stresses: &mut [f64]) {
     even_out(&Linear::new(points), stresses);
 }
@@ -173,8 +172,8 @@ impl Linear {
     }
 }
 
-/// Stiffness of an element with a linear volume strain, row-major: Σ B̄ᵀ D B̄ w, with the rows of B̄ those of
-/// B plus a third of what the linear trace exceeds their own by.
+/// Stiffness of an element with a linear volume strain, row-major: Σ B̄ᵀ D B̄ w. The rows of B̄ are those of B plus a
+/// third of the difference between linear and own trace.
 pub(super) fn linear_volume_stiffness<const N: usize>(
     points: &[Point<N>],
     axes: &Axes,

@@ -23,7 +23,7 @@ pub(super) struct Reference<const N: usize> {
     /// The function that is one at the first point and zero at the other points of the law,
     /// evaluated at the second argument.
     pub(super) function: fn([f64; 2], [f64; 2]) -> f64,
-    /// What such functions are made of besides what is linear, where there are this many points along ξ and along η.
+    /// Terms of such functions beyond the linear ones, for this many points along ξ and along η.
     pub(super) beyond_linear: fn([usize; 2], [f64; 2]) -> Vec<f64>,
 }
 
@@ -41,7 +41,7 @@ fn off([a, b, m]: [[f64; 2]; 3]) -> f64 {
     off[0].hypot(off[1]) / (b[0] - a[0]).hypot(b[1] - a[1])
 }
 
-/// Whether the sides of a quad along ξ, and those along η, turn by so much that two points along them do not follow.
+/// Whether the sides of a quad along ξ, and those along η, turn too much to be followed by two points along them.
 pub(super) fn bent(places: &[[f64; 2]; 8]) -> [bool; 2] {
     let is_bent = |side: usize| off(QUAD8.sides[side].map(|node| places[node])) > BENT;
     [0, 1].map(|first| is_bent(first) || is_bent(first + 2))
@@ -49,7 +49,8 @@ pub(super) fn bent(places: &[[f64; 2]; 8]) -> [bool; 2] {
 
 /// A side whose middle lies off the middle of its ends by less than this part of it is straight.
 const STRAIGHT: f64 = 1e-12;
-/// A side whose middle lies off by less turns by less than 5°: two points follow it within 10⁻⁴ (a ring's displacements).
+/// A side whose middle lies off by less turns by less than 5°: two points follow it within 10⁻⁴ (a ring's
+/// displacements).
 const BENT: f64 = 1e-2;
 
 /// An integration point of the reference element.

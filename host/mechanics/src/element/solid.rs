@@ -544,9 +544,8 @@ impl<const N: usize> Solid<N> {
         })
     }
 
-    /// Σ Bᵀ D B w, by blocks: with displacements u₁, u₂ along the element's axes,
-    /// column i of B is (a, 0, h e₁, b) for u₁ and (0, b, h e₂, a) for u₂, where e is the radial
-    /// direction in these axes.
+    /// Σ Bᵀ D B w, by blocks. With displacements u₁, u₂ along the element's axes, column i of B is (a, 0, h e₁, b) for
+    /// u₁ and (0, b, h e₂, a) for u₂; e is the radial direction in these axes.
     #[inline(always)]
     fn element_stiffness(&self, element: usize, tangent: &[f64], out: &mut [f64]) {
         let axes = &self.axes[element];

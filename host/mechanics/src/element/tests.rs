@@ -454,8 +454,8 @@ fn bowed([across, up]: [f64; 2]) -> [[f64; 2]; 8] {
     })
 }
 
-/// Of three points along bent sides, too, nodal forces of a linear stress are exact, and those of rest are those of ground
-/// at rest.
+/// Also with three points along bent sides the nodal forces of a linear stress are exact, so ground at rest stays at
+/// rest.
 #[test]
 fn bent_quads_carry_a_linear_stress() {
     for (bows, n) in [
@@ -499,8 +499,8 @@ fn bent_quads_carry_a_linear_stress() {
     );
 }
 
-/// Nodes do not integrate N t r where all three grow along a side, nor anything on a curve; where the radius is the same,
-/// or none exists, they do.
+/// Nodes do not integrate N t r where all three grow along a side, nor anything on a curve; where the radius is the
+/// same, or none exists, they do.
 #[test]
 fn tractions_that_are_gathered_at_nodes_have_exact_nodal_forces() {
     use super::Joint6;

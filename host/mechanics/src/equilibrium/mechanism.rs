@@ -1,7 +1,7 @@
-//! What gives way where no equilibrium is found: the point, and how, where most is out of balance.
+//! Mechanism of a step without equilibrium: the point that gives way where the residual is largest, and how.
 
 use super::newton::PointPlace;
-use crate::group::{Gives, Group};
+use crate::group::{FailureMode, Group};
 use serde::Serialize;
 use std::fmt;
 
@@ -12,7 +12,7 @@ pub struct Mechanism {
     #[serde(flatten)]
     pub at: PointPlace,
     /// How it gives way.
-    pub how: Gives,
+    pub how: FailureMode,
     /// At how many points of its group, and of how many.
     #[serde(rename = "points_of")]
     pub points: [usize; 2],
@@ -42,8 +42,8 @@ impl fmt::Display for Mechanism {
 /// Jumps of all points of groups, by the group's number.
 pub(super) type Jumps = Vec<(usize, Vec<f64>)>;
 
-/// What gives way in the trial state of the groups under iteration, whose residual is given by degree of freedom; points
-/// whose traction breaks off since an earlier iterate, with these jumps by group, are told from others.
+/// Finds what gives way in the trial state of the groups under iteration. `residual`: by degree of freedom. `before`:
+/// jumps of an earlier iterate by group; points whose traction has broken off since are distinguished from others.
 pub(super) fn find(
     groups: &[Group],
     includes: impl Fn(usize) -> bool,
@@ -52,7 +52,7 @@ pub(super) fn find(
     time: f64,
 ) -> Option<Mechanism> {
     let at_node = |&node: &usize| residual[2 * node].hypot(residual[2 * node + 1]);
-    let mut worst: Option<(f64, Gives, usize, usize, usize)> = None;
+    let mut worst: Option<(f64, FailureMode, usize, usize, usize)> = None;
     for (number, group) in groups.iter().enumerate() {
         if !includes(number) || group.is_linear() || !group.is_active {
             continue;
@@ -63,11 +63,11 @@ pub(super) fn find(
         let n_points = group.kinematics.n_points();
         let how = |point: usize| {
             if breaks(point) {
-                return Some(Gives::BondBreaks);
+                return Some(FailureMode::BondBreaks);
             }
             group.gives(point, time)
         };
-        let all: Vec<Option<Gives>> = (0..n_points).map(how).collect();
+        let all: Vec<Option<FailureMode>> = (0..n_points).map(how).collect();
         for (point, how) in all.iter().enumerate() {
             let Some(how) = *how else {
                 continue;

@@ -17,23 +17,24 @@
 
 mod acceleration;
 mod acceptance;
-mod cause;
+mod arc_length;
+mod convergence;
 mod failure;
-mod given;
+mod failure_cause;
 mod iterate;
-mod kept;
 mod line_search;
-mod load;
+mod load_step;
 mod loads;
 mod matrix;
+mod matrix_reuse;
 mod outcome;
-mod path;
-mod relaxation;
+mod reference;
 mod residual;
 mod round_off;
-mod verdict;
 mod viscous_control;
+mod viscous_relaxation;
 
+pub use arc_length::Measure;
 pub use failure::{
     Criterion, Culprit, DomainFailure, Imbalance, Iterations, Motion, PointPlace, Reason, Runaway,
     Singularity, StepFailure, Symptom, Unmet,
@@ -42,23 +43,22 @@ pub use loads::Loads;
 pub use matrix::Matrix;
 pub(super) use matrix::noise;
 pub use outcome::{Costs, Guess, Iteration, Open, StepSuccess};
-pub use path::Measure;
 pub(super) use round_off::{ACCEPTED_ROUND_OFF, last_bit_scattered};
 pub(crate) use round_off::{ROUND_OFF, STILL_SMALL};
 
-use super::linear_domain::LinearDomain;
+use super::condensation::LinearDomain;
 use crate::assembly::{Places, System, norms};
 use crate::group::Group;
 use crate::settings::Settings;
 use acceptance::Change;
 use algebra::LinearSolver;
-use given::Given;
+use arc_length::ArcLength;
 use iterate::Equilibrium;
-use kept::Kept;
 use law::Operator;
 use law::Stop;
-use load::LoadControl;
-use path::ArcLength;
+use load_step::LoadControl;
+use matrix_reuse::Kept;
+use reference::Given;
 use residual::Task;
 use std::time::Instant;
 

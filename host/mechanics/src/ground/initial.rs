@@ -63,7 +63,7 @@ impl<'p> InitialStresses<'p> {
         })
     }
 
-    /// What stands above a point of a group at rest, with the surcharge, and the pressure in its pores,
+    /// Total vertical stress at a point of a group at rest (weight above it and surcharge), and its pore pressure;
     /// compression positive, kPa.
     pub(crate) fn on_a_plane(&self, number: usize, at: [f64; 2]) -> [f64; 2] {
         let columns = self.columns.as_ref();
@@ -82,9 +82,8 @@ impl<'p> InitialStresses<'p> {
         ]
     }
 
-    /// Stress of the ground on the two sides of a joint of group `number` at a point of it: the mean of the
-    /// sides that have one, with as much of it in the water as there is between the faces. `faces`: the nodes
-    /// in the middle of its two faces.
+    /// Stress of the ground around a joint of group `number` at a point of it: the mean of the sides that have one. It
+    /// is effective if there is water between the faces, else total. `faces`: the nodes in the middle of its two faces.
     pub(crate) fn beside(&self, number: usize, faces: [usize; 2], at: [f64; 2]) -> [f64; 4] {
         let mesh = &self.problem.mesh;
         let has_water = |group: usize| self.problem.groups[group].pore_water;

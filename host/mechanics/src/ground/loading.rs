@@ -319,9 +319,9 @@ impl Loading {
     }
 }
 
-/// Weights of elements that contain the water table, by number within the group and among the solids: what
-/// balances the vertical stress of the same ground, −σ_22 = γ (level − y) with γ of either side, so that
-/// ground at rest is at rest.
+/// Weights of elements that contain the water table; `elements`: numbers within the group and among the solids. They
+/// balance the vertical stress of the same ground, −σ_22 = γ (level − y) with γ of either side, so that ground at rest
+/// stays at rest.
 fn add_cut_weights(
     problem: &Problem,
     group: &Group,

@@ -1,9 +1,10 @@
 //! Points of interfaces whose traction breaks off on the way from one trial state to another.
 //!
-//! The host knows no law, and asks it: a traction that changes over a vanishing part of the way has lost what it carried.
+//! The host knows no law, and asks it: a traction that changes over a vanishing part of the way has lost what it
+//! carried.
 
 use super::Group;
-use super::torn::SLIP;
+use super::broken_bonds::SLIP;
 use law::Operator;
 
 /// Equal parts of the way that are looked at first, and how often a part is halved.
@@ -18,14 +19,16 @@ const SHORT: f64 = 1e-9;
 type Reached = (f64, Vec<f64>);
 
 impl Group {
-    /// Whether it is an interface with a bond that may break: its law carries shear without normal stress.
+    /// Whether it is an interface with a bond that may break: at some point its law carries shear without normal stress.
     pub fn may_break(&self) -> bool {
+        let is_bonded = |point| {
+            let traction = self.tried(point, [0.0, SLIP]);
+            traction.is_some_and(|traction| traction[1].abs() > 0.0)
+        };
         self.is_active
             && !self.is_linear()
             && self.law.built.law.n_components() == 2
-            && self
-                .tried([0.0, SLIP])
-                .is_some_and(|traction| traction[1].abs() > 0.0)
+            && (0..self.kinematics.n_points()).any(is_bonded)
     }
 
     /// Jumps of the trial state, of all points.
@@ -33,8 +36,8 @@ impl Group {
         self.gradient().trial.clone()
     }
 
-    /// Whether the traction of a point breaks off between these jumps of all points and those of the trial state. The way
-    /// takes no time.
+    /// Whether the traction of a point breaks off between these jumps of all points and those of the trial state. The
+    /// way takes no time.
     pub fn breaks(&self, point: usize, jumps: &[f64], time: f64) -> bool {
         self.finds_break(point, jumps, time).unwrap_or(false)
     }

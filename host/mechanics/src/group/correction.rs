@@ -1,15 +1,15 @@
-//! What the points of an interface do not integrate of the tractions that it begins with.
+//! Integration error of the tractions that an interface begins with.
 //!
-//! Laws are asked at the nodes, and forces at the nodes are not the integral of a stress that grows along a side whose
-//! radius or direction changes. What they lack stays next to the law's answer, so that tractions are the stress of the ground
-//! and nothing moves.
+//! Laws are evaluated at the nodes, and forces from there do not integrate a stress that grows along a side whose
+//! radius or direction changes. The difference is kept next to the law's answer, so that tractions are the stress of
+//! the ground and nothing moves.
 
 use super::Group;
 use crate::element::Axes;
 
 impl Group {
-    /// What exact integration adds to the tractions of an interface at its points; `traction` gives them by element,
-    /// place and axes there.
+    /// Exactly integrated tractions of an interface less those at its points; `traction` gives them by element, place
+    /// and axes there.
     pub fn lost(
         &self,
         at_points: &[f64],

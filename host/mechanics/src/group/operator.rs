@@ -1,7 +1,7 @@
 //! The elastic operator of one point, for whoever wants to know how stiff a body is.
 
 use super::Group;
-use law::{End, Operator, Start, Strided, calls};
+use law::{End, Operator, Start, Strided, current_call};
 
 impl Group {
     /// The law's elastic operator at a point of solids in the committed state, row by row. `None`
@@ -26,7 +26,7 @@ impl Group {
         let (mut flux, mut state_end) = (vec![0.0; n], state.to_vec());
         let mut operator = vec![0.0; n * n];
         let site = law.asks_for_sites().then(|| self.site(point));
-        calls::of_group(self.watched, point, self.kinematics.points_of(0).len());
+        current_call::of_group(self.watched, point, self.kinematics.points_of(0).len());
         let start = Start {
             n_points: 1,
             gradient: (&zero, rows),

@@ -1,6 +1,6 @@
 //! What a group carries from one increment to the next: taken, held against the group, and taken up again.
 
-use super::torn::Bond;
+use super::broken_bonds::Bond;
 use super::water::Pores;
 use super::{Field, Group, LawCalls, Origin};
 use crate::problem::Material;

@@ -6,9 +6,9 @@
 //! - Δu = −(K_w/n) Δε_v (1)
 //! - K_w/n = 2G (1 + ν_u)/(3 (1 − 2ν_u)) − K' (2)
 //!
-//! where G and K' are those of the law's elastic operator and ν_u is Poisson's ratio of the undrained
-//! ground. The law sees effective stresses σ'; the element carries σ' − u δ, with the tangent
-//! D + (K_w/n) δ δᵀ. When it drains again, the remaining u dissipates in proportion to the phase's time, however long that is.
+//! where G and K' are those of the law's elastic operator and ν_u is Poisson's ratio of the undrained ground. The law
+//! sees effective stresses σ'; the element carries σ' − u δ, with the tangent D + (K_w/n) δ δᵀ. When it drains again,
+//! the remaining u dissipates in proportion to the phase's time, however long that is.
 
 use super::{Field, Group, PointFailure};
 use crate::element::Axes;
@@ -139,8 +139,8 @@ impl Group {
         }
     }
 
-    /// Stresses that the elements carry, of the committed state: with excess pore pressure, of interfaces with what exact
-    /// integration adds to the tractions that they began with.
+    /// Stresses that the elements carry, of the committed state: with excess pore pressure, of interfaces with what
+    /// exact integration adds to the tractions that they began with.
     pub fn carried(&self) -> Cow<'_, [f64]> {
         self.with_excess(&self.stress.committed, |excess| &excess.committed)
     }

@@ -1,10 +1,9 @@
 //! Inserts zero-thickness elements between the elements of a mesh, by splitting nodes.
 //!
-//! Lines are sets of edges, straight or curved, closed, with corners, ends and junctions. Around a
-//! node the elements form sectors: one leads to the next through edges that are not cut. The first
-//! sector keeps the node, every other one gets a copy of it. So a line that ends inside the body
-//! leaves its last node single, a line through it makes two of a node, a line that ends on another
-//! three, and two that cross four, whatever is inserted first.
+//! Lines are sets of edges, straight or curved, closed, with corners, ends and junctions. Around a node the elements
+//! form sectors: one leads to the next through edges that are not cut. The first sector keeps the node, every other one
+//! gets a copy of it. So a line that ends inside the body leaves its last node single. A line through a node makes two
+//! of it, a line that ends on another makes three, and two that cross make four, in whatever order they are inserted.
 //!
 //! An edge is known by the node in its middle, which belongs to no other edge.
 
@@ -42,9 +41,9 @@ struct Joint {
 }
 
 impl Joint {
-    /// Nodes on the near and on the far side, each from the first end to the second, so that both
-    /// axes of the facet point from the one to the other: towards increasing coordinates (see
-    /// `Axes::of_facet`), whatever the direction of the line.
+    /// Nodes on the near and on the far side, each from the first end to the second. Both axes of the facet, from near
+    /// to far and from first to second, then point towards increasing coordinates (see `Axes::of_facet`), whatever the
+    /// direction of the line.
     fn near_and_far(&self, coordinates: &[[f64; 2]]) -> [[usize; 3]; 2] {
         let increases = |direction: [f64; 2]| increase(direction) > 0.0;
         let [a, b, _] = self.right.map(|node| coordinates[node]);

@@ -51,7 +51,7 @@ pub(crate) fn problem(problem: &Problem) -> Result<(), Refusal> {
         return Err(Refusal::new(Item::Water(None), cause));
     }
     phases(problem, &faces)?;
-    super::faces::check(problem)
+    super::loads_on_interfaces::check(problem)
 }
 
 /// A face of a zero-thickness element: its group, the adjacent solid, its middle.

@@ -1,8 +1,8 @@
 //! Whether supports and prescribed displacements fit together, phase by phase.
 
-use super::alike::Alike;
-use super::futile::{self, Holder};
-use super::held::{Motion, Part, loose, parts};
+use super::ineffective_loads::{self, Holder};
+use super::restraint::{Motion, Part, loose, parts};
+use super::tied_dofs::TiedDofs;
 use super::{Analysis, Axis, Cause, Displacement, Free, Item, Phase, Problem, Refusal};
 use crate::assembly::Tie;
 use crate::mesh::{Line, Mesh};
@@ -75,7 +75,7 @@ pub(crate) fn check(problem: &Problem, ties: &[Tie]) -> Result<Vec<String>, Refu
         }
         held.push(constraints.held_in(number, &active));
     }
-    warnings.extend(futile::check(problem, &held)?);
+    warnings.extend(ineffective_loads::check(problem, &held)?);
     Ok(warnings)
 }
 
@@ -184,10 +184,10 @@ impl<'a> Constraints<'a> {
         Ok(())
     }
 
-    /// What is held in a phase: with one of some degrees of freedom that move alike all are.
+    /// Degrees of freedom held in a phase; if one of several that move alike is held, all are.
     fn held_in(&self, number: usize, active: &[bool]) -> HashMap<usize, Holder> {
         let mut held = self.held.clone();
-        let alike = Alike::in_phase(self.problem, number, |group| active[group]);
+        let alike = TiedDofs::in_phase(self.problem, number, |group| active[group]);
         for dof in &alike.still {
             held.entry(*dof).or_insert(Holder::Support);
         }

@@ -78,13 +78,13 @@ impl From<[f64; 4]> for InitialStress {
     }
 }
 
-/// Earth pressure at rest: σ'_v is the weight of what stands above, less the pore pressure.
+/// Earth pressure at rest: σ'_v is the weight of the ground above, less the pore pressure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AtRest {
     /// Ratio or formula of σ'_h and σ'_v.
     pub ratio: Ratio,
-    /// Added to σ'_v here, and on the same vertical in all groups below that have none of their own, kPa.
-    /// `None`: what is carried down from above.
+    /// Added to σ'_v here, and on the same vertical in all groups below without a surcharge, kPa. `None`: carried down
+    /// from above.
     pub surcharge: Option<f64>,
 }
 

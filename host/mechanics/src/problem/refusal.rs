@@ -331,7 +331,8 @@ pub enum Cause {
     OtherElements(String, Formulation),
     /// An element or a line refers to what there is not.
     OutOfRange(&'static str),
-    /// This (a pressure, force, displacement or support) of a line along which an interface stands: which face is meant?
+    /// This (a pressure, force, displacement or support) of a line along which an interface stands: which face is
+    /// meant?
     OnInterface(&'static str, String),
     /// A part of the model is not held.
     Loose {

@@ -4,8 +4,8 @@ use super::{Point, Strain};
 
 /// 1, x, y, x y, x², y².
 const TERMS: usize = 6;
-/// A term that is this near to a sum of the terms before it, relative to its own size, is left out: the points do
-/// not tell it, as those of a single row of elements do not tell y².
+/// A term that is this near to a sum of the terms before it, relative to its size, is left out. The points do not
+/// determine it, as those of a single row of elements do not determine y².
 const DEPENDENT: f64 = 0.02;
 
 /// A polynomial for every component.

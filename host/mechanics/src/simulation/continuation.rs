@@ -1,6 +1,7 @@
-//! What leads the steps of an increment under `control = "auto"`: the load; where ever shorter steps by the load fail,
-//! viscous control by short steps, to the end of the increment; by turns, where viscous control fails too. Where all of that, or `control = "viscous"`,
-//! has led no further and interfaces may break, viscous control by single corrections.
+//! Control of the steps of an increment. Under `control = "auto"` the load leads first. If ever shorter steps by the
+//! load fail, viscous control leads by short steps to the end of the increment; if it fails too, both lead by turns.
+//! The last resort, also under `control = "viscous"`, is viscous control by single corrections, if interfaces may
+//! break.
 
 use crate::equilibrium::{Reason, Singularity, StepFailure};
 use crate::settings::{Control, Settings};
@@ -16,10 +17,10 @@ pub(super) const LONGEST: f64 = 0.125;
 /// The shortest one if the load may not be cut any further: viscous control has its own cuts.
 const SHORTEST: f64 = LONGEST / 8.0;
 
-/// How often viscous control by single corrections is begun with in an increment: with the shortest step, then with the longest.
+/// How often single corrections may begin in an increment: with the shortest step, then with the longest.
 const BEGINNINGS: usize = 2;
 
-/// What leads the steps of an increment.
+/// Control that leads the steps of an increment.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lead {
     pub(super) control: Control,
@@ -56,8 +57,8 @@ impl Lead {
         }
     }
 
-    /// Turns to viscous control by single corrections after a step that failed, if it may be begun with: the length of the first step
-    /// as a load factor, between the `shortest` one and the longest of one of `n` increments.
+    /// Turns to viscous control by single corrections after a failed step, if it may begin. Returns the length of the
+    /// first step as a load factor: the `shortest` at first, then the longest of one of `n` increments.
     pub(super) fn begins_singly(
         &mut self,
         failure: &StepFailure,
@@ -79,12 +80,13 @@ impl Lead {
         Some(length)
     }
 
-    /// Whether steps have failed as often in a row as any other way but the load waits for, this one included.
+    /// Whether enough steps have failed in a row, this one included, to turn from the load to another way.
     pub(super) fn has_waited(&self) -> bool {
         !self.singly && self.failures + 1 >= PATIENCE
     }
 
-    /// Whether single corrections end with a next step of this fraction of an increment: they may not be begun with again.
+    /// Whether single corrections end with a next step of this fraction of an increment: they may not be begun with
+    /// again.
     pub(super) fn is_at_its_end(&self, step: f64) -> bool {
         self.singly && self.beginnings == 0 && step < SHORTEST
     }
@@ -99,8 +101,8 @@ impl Lead {
         self.may_be_viscous && self.control == Control::Viscous && !self.singly
     }
 
-    /// Whether viscous control goes on with a step of this fraction of an increment after one that failed: where the load may
-    /// not be cut so far (`is_out`), no other way is left.
+    /// Whether viscous control goes on with a step of this fraction of an increment after one that failed: where the
+    /// load may not be cut so far (`is_out`), no other way is left.
     pub(super) fn stays(&self, is_out: bool, step: f64) -> bool {
         self.is_viscous() && is_out && step >= SHORTEST
     }
@@ -115,8 +117,8 @@ impl Lead {
         self.failures = 0;
     }
 
-    /// Turns to what leads after a step that failed (the last one that may be tried, or not), and whether that is another one. Laws
-    /// that fail want smaller steps by the load, and what moves freely is held by nothing.
+    /// Turns to what leads after a step that failed (the last one that may be tried, or not), and whether that is
+    /// another one. Laws that fail want smaller steps by the load, and what moves freely is held by nothing.
     pub(super) fn turns(&mut self, failure: &StepFailure, was_last: bool) -> bool {
         let is_viscous = self.is_viscous();
         if is_free(failure) || failure.failed().is_some() && !is_viscous {

@@ -57,9 +57,8 @@ impl History {
         Some((step.length, &step.increment))
     }
 
-    /// What a step of this length probably ends with: the increments extrapolated by the
-    /// polynomial that would have predicted the latest ones best, or in proportion to them where
-    /// the last steps were not equally long.
+    /// Predicted increments of a step of this length. They are extrapolated by the polynomial that would have predicted
+    /// the latest ones best, or in proportion to the latest if the last steps were not equally long.
     pub(super) fn guess(&self, length: f64) -> Option<Guess> {
         let latest = self.steps.front()?;
         let is_equal = |step: &&Step| (step.length - length).abs() <= EQUAL * length;

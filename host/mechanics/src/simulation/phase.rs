@@ -1,6 +1,6 @@
 //! A phase: its equations, its loads, and what is out of balance as it begins.
 
-use super::complete::among_both;
+use super::commit::among_both;
 use super::history::History;
 use super::state::PhaseCourse;
 use super::{PhaseRecord, Simulation, UnderWay, Warning, Watch};
@@ -336,8 +336,9 @@ impl Simulation {
         Ok((equations, loads))
     }
 
-    /// The linear part of a phase and the equations of the rest, if it is to be condensed: the groups that stay
-    /// linear in the phases to come, which need no other factors then; where that does not pay, those that are now.
+    /// The linear part of a phase and the equations of the rest, if it is to be condensed. Preferred are the groups
+    /// that stay linear in the phases to come, which then need no other factors; if that does not pay, those that are
+    /// linear now.
     fn condensed(
         &mut self,
         number: usize,

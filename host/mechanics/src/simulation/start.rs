@@ -1,5 +1,4 @@
-//! The start of a phase: laws are swapped, and what they make of the stresses they find is taken
-//! over; loads.
+//! The start of a phase: laws are swapped, their answer to the stresses they find is taken over, and loads are set.
 
 use super::loads::Prescribed;
 use super::{Simulation, Warning, Watch};
@@ -13,13 +12,12 @@ use crate::problem::{Cause, Formulation, InitialStress, Item, Key, Refusal};
 use abi::status::Outcome;
 use law::Moment;
 
-/// A point of an interface is moved this far towards the middle of the adjacent element, as a fraction of the way:
-/// where it reaches the surface of the ground, rounding does not decide whether it is compressed.
+/// A point of an interface is moved by this fraction of the way to the middle of the adjacent element. So where it
+/// reaches the surface of the ground, rounding does not decide whether it is compressed.
 const INSIDE: f64 = 1e-11;
-/// Change of stress, relative to the largest of its group and of all groups, that is worth a word.
+/// Change of stress, relative to the largest of its group and of all groups, that is reported.
 const WORTH_A_WORD: f64 = 1e-6;
-/// The same, of earth pressure at rest, from which the law's strength is what is meant and not its own
-/// tolerance.
+/// The same for earth pressure at rest: above the law's tolerance, so that it means its strength.
 const OUTSIDE: f64 = 1e-3;
 
 impl Simulation {
@@ -62,7 +60,7 @@ impl Simulation {
             self.groups[group].moment = moment;
             let parted = self.groups[group].set_law(law).map_err(cannot_start)?;
             if let Some(parted) = parted {
-                watch.warning(&Warning::Parted(phase.name.clone(), parted));
+                watch.warning(&Warning::GroupSplit(phase.name.clone(), parted));
             }
         }
         for (&group, [stress, lost]) in phase.activate.iter().zip(beside) {

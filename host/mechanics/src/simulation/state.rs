@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
-/// State of a simulation after a whole increment, or where one could not be finished. Copies are independent of each other.
+/// State of a simulation after a whole increment, or where one could not be finished. Copies are independent of each
+/// other.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct State<'s> {
     /// Number of the phase, from 0.

@@ -1,8 +1,8 @@
 //! Steps from equilibrium to equilibrium up to the end of an increment: how long they are, and what follows where
 //! one finds none.
 
+use super::arc_length::PathEnd;
 use super::continuation::{self, Lead};
-use super::path::PathEnd;
 use super::{Simulation, UnderWay, Warning, Watch, go_on, stopped};
 use crate::equilibrium::{Guess, Newton, StepFailure, StepSuccess};
 use crate::error::{Error, Place};

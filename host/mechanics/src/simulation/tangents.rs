@@ -1,19 +1,18 @@
-//! The source of the tangents of a phase's laws: the laws, as long as they are the derivatives of
-//! their stresses, or from differences of these.
+//! The source of the tangents of a phase's laws: the laws, as long as their tangents are the derivatives of their
+//! stresses, else differences of these.
 
 use super::{Simulation, Warning, Watch};
 use crate::equilibrium::{Clock, StepFailure, StepSuccess};
 use crate::group::{MadeBy, Went};
 use crate::settings::Tangents;
 
-/// More iterations than consistent tangents mostly need; and so many that differences, with ten evaluations
-/// for each of the few iterations that they take, cost less.
+/// Consistent tangents mostly need no more iterations than this.
 const MANY: usize = 6;
+/// With more, differences cost less: ten evaluations for each of the few iterations that they take.
 const TOO_MANY: usize = 12;
 
 impl Simulation {
-    /// Tells the groups of a phase where their tangents come from, and who watches, what is not from the
-    /// laws.
+    /// Tells the groups of a phase where their tangents come from, and warns of laws that declare theirs approximate.
     pub(super) fn choose_tangents(&mut self, watch: &mut dyn Watch) {
         let settings = self.problem.settings;
         for group in &mut self.groups {
@@ -25,8 +24,7 @@ impl Simulation {
         }
     }
 
-    /// Looks at the laws' tangents after a step that took many iterations. Says so if some are differences
-    /// from now on.
+    /// Looks at the laws' tangents after a step that took many iterations. Warns if some are not derivatives.
     pub(super) fn look_after(
         &mut self,
         success: &StepSuccess,

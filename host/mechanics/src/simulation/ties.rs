@@ -1,10 +1,10 @@
-//! Displacements that are one in a phase: faces of interfaces that are not there, lines that are rigid.
+//! Displacements that are tied in a phase: at faces of absent interfaces and on rigid lines.
 
 use super::Simulation;
 use super::loads::{Prescribed, part};
 use crate::assembly::Tie;
 use crate::error::Error;
-use crate::problem::alike::Alike;
+use crate::problem::tied_dofs::TiedDofs;
 use crate::problem::{Cause, Item, Refusal};
 use std::collections::{HashMap, HashSet};
 
@@ -60,9 +60,9 @@ impl Simulation {
         }
     }
 
-    /// Ties of a phase whose own prescribed displacements these are. Where one of some displacements that
-    /// move alike is prescribed, all are: they move by the same, or, where nodes that stand apart are prescribed to stand
-    /// at one place, to that place.
+    /// Ties of a phase whose own prescribed displacements these are. If one of several displacements that move alike is
+    /// prescribed, all are. They get the same increment or, if nodes apart are prescribed to one place, move to that
+    /// place.
     ///
     /// # Errors
     /// Two of them are prescribed to move differently, and not to one place.
@@ -71,7 +71,7 @@ impl Simulation {
         number: usize,
         mut prescribed: Vec<Prescribed>,
     ) -> Result<Tied, Error> {
-        let alike = Alike::in_phase(&self.problem, number, |group| self.groups[group].is_active);
+        let alike = TiedDofs::in_phase(&self.problem, number, |group| self.groups[group].is_active);
         let held = alike.still.clone();
         let own: HashMap<usize, [f64; 2]> = prescribed
             .iter()

@@ -3,7 +3,7 @@
 use super::Neighbour;
 use crate::equilibrium::Open;
 use crate::error::Place;
-use crate::group::{Notice, Parted, TakeOver, Torn};
+use crate::group::{BrokenBond, GroupSplit, LawStart, Notice};
 use law::TimeDependence;
 use std::fmt;
 
@@ -54,7 +54,8 @@ pub enum Warning {
     },
     /// Relaxation led to the equilibrium of this increment, the first one of its phase; where another way leads.
     Relaxed(Place, Option<Neighbour>),
-    /// Steps of an increment were cut back; where two halves of a shorter one lead, the first of its phase that lead elsewhere.
+    /// Steps of an increment were cut back; where two halves of a shorter one lead, the first of its phase that lead
+    /// elsewhere.
     CutBack(Place, Neighbour),
     /// Viscous control, which the settings ask for, did so.
     Viscous(Place),
@@ -111,9 +112,9 @@ pub enum Warning {
     /// A law changed the process, which was set right.
     Restored(Place, String),
     /// A law starts in this phase where an interface is open.
-    Parted(String, Parted),
+    GroupSplit(String, GroupSplit),
     /// What a law, which starts in this phase, makes of the stresses it finds.
-    TookOver(String, TakeOver),
+    TookOver(String, LawStart),
     /// A law could not be asked that; this is what it says.
     Unasked(String, String),
     /// Steps of the load found no equilibrium: viscous control leads from here on.
@@ -130,7 +131,7 @@ pub enum Warning {
         between: [f64; 2],
     },
     /// A bond that the first tension breaks began without normal stress, and has opened.
-    Torn(Place, Torn),
+    BrokenBond(Place, BrokenBond),
 }
 
 impl Warning {
@@ -153,7 +154,7 @@ impl fmt::Display for Warning {
         match self {
             Self::Note(note) => write!(f, "{note}"),
             Self::OutOfBalance(phase, share) => out_of_balance(f, phase, *share),
-            Self::Torn(place, torn) => write!(f, "{place}: {torn}"),
+            Self::BrokenBond(place, torn) => write!(f, "{place}: {torn}"),
             Self::Approximate(law) => write!(
                 f,
                 "law `{law}` declares its tangents approximate: differences of its stresses replace them"
@@ -223,7 +224,7 @@ impl fmt::Display for Warning {
                  in this phase counts from where they stand"
             ),
             Self::Restored(place, change) => write!(f, "{place}: {change}"),
-            Self::Parted(phase, parted) => write!(f, "phase `{phase}`: {parted}"),
+            Self::GroupSplit(phase, parted) => write!(f, "phase `{phase}`: {parted}"),
             Self::TookOver(phase, change) => write!(
                 f,
                 "phase `{phase}`: {change}, carried to equilibrium in the phase's course"

@@ -2,9 +2,9 @@
 //! whatever ended them.
 //!
 //! Tolerances are relative to fluxes and gradients, as far as what the path was given explains
-//! them ([`Anchor`](crate::anchor::Anchor)).
+//! them ([`ToleranceScale`](crate::tolerance_scale::Anchor)).
 
-use super::size::{largest, norm};
+use super::norm::{largest, norm};
 use super::{Miss, Search};
 use crate::state::{Goal, N_MAX, Point, Step, Vector};
 

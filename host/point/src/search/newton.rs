@@ -1,7 +1,7 @@
 //! Newton's method with the law's tangent, and the way out of zones where the flux does not answer.
 
 use super::acceptance::{MAX_POLISH, Verdict};
-use super::size::{largest, norm};
+use super::norm::{largest, norm};
 use super::{Fatal, Search};
 use crate::state::{Step, Vector};
 use std::mem::swap;

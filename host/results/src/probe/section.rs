@@ -63,9 +63,9 @@ fn of_solids(mesh: &Mesh, line: &Line, number: usize) -> Option<Section> {
     Some(Section { elements, nodes })
 }
 
-/// Elements of a group on the side of a line on which these edges count, `other` edges being those of the
-/// other side: with an edge on the line, or around a node of it, as triangles are. Around a node at
-/// which the line ends within the group there are no two sides: what lies next to the line counts there.
+/// Elements of a group on the side of a line that `edges` belong to; `other` are the edges of the other
+/// side. The elements have an edge on the line or, as some triangles, only a node. Around a node at which
+/// the line ends within the group the sides are not separate: only elements next to the line count there.
 fn on_the_side(
     mesh: &Mesh,
     group: usize,

@@ -2,7 +2,7 @@
 //! round-off is held against.
 
 use super::{PointQuantity, Probe, Probes};
-use crate::wanted::Reduce;
+use crate::output_request::Reduce;
 use mechanics::group::Group;
 use mechanics::problem::Formulation;
 use mechanics::simulation::Snapshot;

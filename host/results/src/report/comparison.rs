@@ -1,8 +1,8 @@
 //! Runs side by side: settings and final values.
 
+use super::number_format::display;
 use super::results::Run;
-use super::short::display;
-use crate::record::{self, RunSetting, text};
+use crate::summary_reader::{self, RunSetting, text};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -90,7 +90,9 @@ pub(super) struct FinalValue {
 
 /// Settings of all runs, in the order in which they first appear.
 pub(super) fn settings(runs: &[Run]) -> Vec<Setting> {
-    let of_runs = runs.iter().map(|run| record::settings(&run.summary));
+    let of_runs = runs
+        .iter()
+        .map(|run| summary_reader::settings(&run.summary));
     let all: Vec<Vec<RunSetting>> = of_runs.collect();
     let mut settings: Vec<Setting> = Vec::new();
     for (number, of_run) in all.into_iter().enumerate() {

@@ -1,7 +1,7 @@
 //! `fields.pvd` and its `*.vtu`: a reader of what this program writes, ASCII arrays, and no more.
 
 use super::budget::Budget;
-use super::short::{Short, thinned};
+use super::number_format::{Short, thinned};
 use crate::fields::CELLS;
 use serde::Serialize;
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! `log.jsonl`: iterations and cut-backs.
 
 use super::budget::Budget;
-use super::short::Short;
+use super::number_format::Short;
 use super::table::Broken;
 use serde::Serialize;
 use serde_json::Value;

@@ -1,9 +1,9 @@
 //! `pile.csv`: what holds along a pile.
 
 use super::budget::Budget;
+use super::number_format::{Short, thinned};
 use super::profile::{AHEAD, Block, Blocks, Place};
 use super::results::Times;
-use super::short::{Short, thinned};
 use super::table::Table;
 use serde::Serialize;
 use std::path::Path;

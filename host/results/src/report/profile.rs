@@ -5,8 +5,8 @@
 //! rows, as probes do, or every row.
 
 use super::budget::Budget;
+use super::number_format::{Short, thinned};
 use super::results::Times;
-use super::short::{Short, thinned};
 use super::table::{Row, Table};
 use serde::Serialize;
 use std::path::Path;

@@ -5,15 +5,15 @@ use super::budget::Budget;
 use super::fields::Fields;
 use super::log::Log;
 use super::model::Model;
+use super::number_format::{Short, extremes, thinned};
 use super::pile::Pile;
 use super::profile::Profile;
-use super::short::{Short, extremes, thinned};
 use super::table::Table;
 use crate::fields::unstructured_grid;
+use crate::output_request::OutputRequest;
 use crate::pressures::Pressure;
-use crate::record::{entries, list, text};
 use crate::summary::{About, Summary};
-use crate::wanted::Wanted;
+use crate::summary_reader::{entries, list, text};
 use mechanics::Simulation;
 use serde::Serialize;
 use serde_json::Value;
@@ -269,7 +269,7 @@ impl Run {
     pub(super) fn before(
         folder: &Path,
         about: &About,
-        wanted: &Wanted,
+        wanted: &OutputRequest,
         simulation: &Simulation,
         warnings: &[String],
     ) -> Self {

@@ -3,9 +3,9 @@
 
 use super::Known;
 use super::budget::Budget;
+use super::number_format::{Short, display, thinned};
 use super::page::{STYLE, running};
 use super::results::Run;
-use super::short::{Short, display, thinned};
 use crate::run_table::shown;
 use crate::study::{
     Design, EFFECTS, Effect, History, Output, ParameterRecord, Record, Row, State, Take, effects,

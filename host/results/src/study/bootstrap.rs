@@ -1,12 +1,12 @@
-//! How sure a number is that comes of scattered runs: the same number of runs drawn from them with replacement, many
-//! times.
+//! Confidence in a number computed from scattered runs: the same number of runs is drawn from them with replacement,
+//! many times.
 //!
 //! Source: B. Efron & R. J. Tibshirani, An introduction to the bootstrap (1993), chapters 12 and 13; of indices of
 //! sensitivity G. E. B. Archer, A. Saltelli & I. M. Sobol', J. Stat. Comput. Simul. 58, 99–120 (1997).
 
 use crate::random::Random;
 
-/// Where the random numbers begin: the same runs have the same intervals.
+/// Seed of the random numbers: the same runs have the same intervals.
 const SEED: u64 = 0;
 /// Samples: this many, fewer of many runs, whose intervals are small.
 const MOST: usize = 500;
@@ -15,8 +15,8 @@ const WORK: usize = 2_000_000;
 /// Probability that an interval leaves out on either side.
 const OUTSIDE: f64 = 0.025;
 
-/// Interval of 95 % of numbers, one row for each number, that `of` makes of drawn runs, by their places among `n`. What
-/// it makes nothing of is left out. `None` of fewer than `LEAST` samples.
+/// Intervals of 95 % of the numbers that `of` computes from drawn runs, given by their places among `n`. Draws without
+/// a result are left out. `None` with fewer than `LEAST` samples.
 pub(super) fn intervals(
     n: usize,
     numbers: usize,

@@ -2,19 +2,18 @@
 //! of the others.
 //!
 //! The values of a parameter are its levels if there are few, and in a grid without holes however many there are: there
-//! the others have the same values at each of them. Else its runs, in the order of their values, are divided into levels
-//! of about as many runs each; runs of one value are of one level. The main effect of a level is the mean of the number
-//! over its runs. The share of the variance that the levels explain is
+//! the others have the same values at each of them. Else its runs, in the order of their values, are divided into
+//! levels of about as many runs each; runs of one value are of one level. The main effect of a level is the mean of the
+//! number over its runs. The share of the variance that the levels explain:
 //!
-//! - in a grid without holes, where the others have the same values at every level, the sum of squares between
-//!   levels over the whole one, η²;
-//! - in a design for indices of sensitivity, the first-order index ([`super::indices`]);
-//! - else Kelley's ε² = 1 − (n−1)/(n−k) · within/whole, which takes off what the scatter of n runs in k
-//!   levels makes up by chance; at least 0.
+//! - In a grid without holes, where the others have the same values at every level: η², the sum of squares
+//!   between levels over the whole one.
+//! - In a design for indices of sensitivity: the first-order index ([`super::indices`]).
+//! - Else Kelley's ε² = 1 − (n−1)/(n−k) · within/whole, at least 0. It deducts what the scatter of n
+//!   runs in k levels explains by chance.
 //!
-//! The interval of ε² is the basic one of the bootstrap: runs drawn from the runs have a share that is known, η² of the
-//! runs, and their ε² lie about it as ε² of the runs lies about the one that is looked for. Its upper end is counted from
-//! 0 where ε² is below.
+//! The interval of ε² is the basic bootstrap interval: ε² of drawn runs scatters about η² of the runs as ε² of the runs
+//! does about the true share. Its upper end is counted from 0 if ε² is negative.
 //!
 //! Source: Kelley, T. L. (1935), "An unbiased correlation ratio measure", PNAS 21.
 
@@ -70,8 +69,8 @@ impl Effect {
     }
 }
 
-/// Effects of all parameters on a number of the runs, the largest first. `parameters`: values by
-/// parameter and run, texts as the number of the text; `numbers` by run, `None` where a run has none that
+/// Effects of all parameters on a number of the runs, the largest first. `parameters`: values by parameter
+/// and run, texts as the number of the text; `numbers` by run, `None` for a run without a number that
 /// counts. A grid with such runs is incomplete: means at its levels are over different values of the others.
 pub fn effects(parameters: &[Vec<f64>], numbers: &[Option<f64>], design: Design) -> Vec<Effect> {
     let is_grid = design == Design::Grid && numbers.iter().all(Option::is_some);
@@ -256,9 +255,9 @@ mod tests {
         assert!((levels[0].mean - 0.25).abs() < 0.02 && (levels[9].mean - 4.75).abs() < 0.02);
     }
 
-    /// 64 random runs, of which a explains one half: of what b does nothing is told from 0 in one study of twenty at
-    /// most, and the interval of a's share holds ½ (less what eight levels leave inside them) nine times in ten at least:
-    /// 275 times of 300, where 285 are nominal.
+    /// 64 random runs: a explains one half, b nothing. The share of b differs from 0 in one study of twenty at most.
+    /// The interval of a's share holds ½ (less what eight levels leave inside them) nine times in ten at least: 275
+    /// times of 300, where 285 are nominal.
     #[test]
     fn intervals_of_shares_hold_what_is_there() {
         let mut random = crate::random::Random::of(20_261_127, 0);

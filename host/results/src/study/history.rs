@@ -81,7 +81,7 @@ impl History {
         counts.then(|| self.output(output)).flatten()
     }
 
-    /// The number of this run that an output asks for; `None` where the run has none.
+    /// The number of this run that an output asks for; `None` if the run lacks it.
     pub fn output(&self, output: &Output) -> Option<f64> {
         let values = self.column(&output.probe)?;
         let is_of_phase = |row: &usize| {

@@ -1,9 +1,9 @@
 //! Indices of sensitivity: of each parameter the part of a number's variance that it brings alone, and the part that it
 //! brings with others.
 //!
-//! A design for them has base points; each is d + 2 runs, one after the other: with the values of a sample A; with
-//! these but for one parameter, which has the value of a sample B, for each parameter; with those of B. With numbers f
-//! about their mean and the variance V of those of A and B, over N base points
+//! A design for them has N base points of d + 2 successive runs each. The first run has the values of a sample A, the
+//! last those of a sample B. Each run between has the values of A but for one parameter, which has that of B. With
+//! numbers f about their mean, and the variance V of those of A and B:
 //!
 //! - first-order index S_i = Σ f_B (f_ABi − f_A)/(N V): A. Saltelli et al., Comput. Phys. Commun. 181, 259–270 (2010),
 //!   table 2 (b);
@@ -30,8 +30,8 @@ pub struct Indices {
     pub total: Estimate,
 }
 
-/// The indices of `parameters` of them, of numbers by run, `None` where a run has none that counts: its base point does
-/// not count. Nothing where nothing varies.
+/// The indices of this many parameters from numbers by run. A run without a number (`None`) excludes its base point.
+/// Nothing where nothing varies.
 pub fn indices(numbers: &[Option<f64>], parameters: usize) -> Vec<Indices> {
     let bases = numbers.chunks_exact(parameters + 2);
     let bases = bases.filter_map(|base| base.iter().copied().collect::<Option<Vec<f64>>>());

@@ -197,7 +197,7 @@ impl Curve {
     /// The computed values at the measured points.
     ///
     /// # Errors
-    /// There are none.
+    /// [`Gap`] if there are no such values.
     pub(super) fn computed(&self, rows: &Rows, values: &[f64]) -> Result<Vec<f64>, Gap> {
         let line = self.line(rows, values)?;
         let spots = self.spots(&line)?;

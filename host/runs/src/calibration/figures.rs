@@ -3,7 +3,7 @@
 use super::{FittedCurve, Outcome};
 use crate::Error;
 use results::figure::Figures;
-use results::wanted::{Figure, Measured};
+use results::output_request::{Figure, Measured};
 use std::path::Path;
 
 /// Points of a drawn profile between two that were computed.

@@ -34,8 +34,8 @@ pub struct FittedCurve {
     /// The computed curve.
     pub line: Vec<(f64, f64)>,
     /// Standard deviation of a new measured value at each point: of its noise, and of the computed value
-    /// as far as that follows from the parameters' own; `None` where it depends on what the tests do not
-    /// determine: it may be anywhere.
+    /// as far as that follows from the parameters' own. `None` if it depends on parameters that the
+    /// tests do not determine: it is unbounded.
     pub deviations: Vec<Option<f64>>,
     /// Root of the mean square of computed less measured values, in the unit of the curve.
     pub rms: f64,
@@ -54,7 +54,7 @@ pub struct FittedCurve {
 /// Notes about the tests.
 #[derive(Debug, Default)]
 pub(super) struct Said {
-    /// Fits that are none, and residuals that are no noise.
+    /// Bad fits, and residuals that are not noise.
     pub(super) bad: Vec<String>,
     /// All else.
     pub(super) others: Vec<String>,

@@ -1,11 +1,11 @@
 //! Least squares within bounds, by the method of Levenberg and Marquardt.
 //!
-//! Minimises S(u) = Σ r_i(u)² over lower ≤ u ≤ upper. Each step solves the damped problem
-//! min ‖r + J δ‖² + λ ‖D δ‖², with D the largest norms that the columns of J have had (Moré 1978), so
-//! that units do not matter, by QR of the stacked matrix, which keeps the digits that normal
-//! equations lose. λ follows the ratio of the reduction found to the one foretold (Nielsen 1999).
-//! A variable at a bound that the gradient points out of is left out of the step; what a step would
-//! carry beyond a bound stays on it.
+//! Minimises S(u) = Σ r_i(u)² over lower ≤ u ≤ upper. Each step solves the damped problem min ‖r + J
+//! δ‖² + λ ‖D δ‖² by QR of the stacked matrix, which keeps the digits that normal equations lose. D
+//! has the largest norms that the columns of J have had (Moré 1978), so that units do not matter. The
+//! damping λ follows the ratio of the actual to the predicted reduction (Nielsen 1999). A variable at
+//! a bound that the gradient points out of is left out of the step; what a step would carry beyond a
+//! bound stays on it.
 
 use nalgebra::{DMatrix, DVector};
 

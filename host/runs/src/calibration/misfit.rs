@@ -1,10 +1,10 @@
 //! Bad fits: residuals as large as the measured values, and possible reasons.
 
 use super::curve::Curve;
-use super::words::digits;
+use super::messages::digits;
 
-/// Root of the mean square of residuals over the largest measured value from which on a fit is bad; and from
-/// which on it is where the computed curve explains less than half of what the measured one varies by.
+/// A fit is bad if the root mean square of residuals exceeds this part of the largest measured value;
+/// `RATHER_BAD` if the computed curve explains less than half of the variation of the measured one.
 const BAD: f64 = 0.25;
 const RATHER_BAD: f64 = 0.1;
 const HALF: f64 = 0.5;

@@ -1,8 +1,8 @@
 //! The tests of a calibration, computed for values of its parameters.
 
+use super::cache::{Kept, Key};
 use super::coordinates::Parameter;
 use super::curve::{Curve, Gap, Rows};
-use super::kept::{Kept, Key};
 use crate::Error;
 use crate::run::identity_of;
 use crate::trade_off::trial::{Scratch, Timing, measure};
@@ -29,12 +29,11 @@ pub(super) struct Model {
     /// Points that are left out.
     pub(super) notes: Vec<String>,
     pub(super) scratch: Scratch,
-    /// What tests whose curves are read in ways that are looked for computed last: another reading needs no other
-    /// computation.
+    /// Last computations of tests with fitted offsets or scales: other values of these need no new computation.
     pub(super) rows_of_late: VecDeque<(Key, Rows)>,
 }
 
-/// So many of these are kept.
+/// Number of these that are kept.
 const OF_LATE: usize = 32;
 
 /// A test.

@@ -2,8 +2,8 @@
 
 use super::Outcome;
 use super::figures::Drawn;
-use super::files::words_of;
-use super::words::digits;
+use super::messages::digits;
+use super::output::words_of;
 use crate::Error;
 use input::calibration::{Calibration, Variance};
 use minijinja::{Environment, Value, context};

@@ -1,11 +1,11 @@
 //! Propagation of the scatter of measured values to parameters and predictions.
 //!
 //! To first order the error of the parameters is linear in the errors η of the measured values, in units of
-//! their noise: δu = L η. A stage that fits u_f while u_h of earlier stages are held has the residuals
-//! −√w η + J_f δu_f + J_h δu_h, so that δu_f = −A⁻¹ J_fᵀ (−√w η + J_h δu_h). That carries the errors of each
-//! stage into the next ones, those of a measured value that several stages are fitted to as one and the same
-//! error. An undetermined direction z of a stage leaves its parameters free along it; later stages
-//! follow it, δu_f = −A⁻¹ J_fᵀ J_h z_h.
+//! their noise: δu = L η. A stage fits u_f while u_h of earlier stages are held. Its residuals are −√w η +
+//! J_f δu_f + J_h δu_h, so that δu_f = −A⁻¹ J_fᵀ (−√w η + J_h δu_h). That carries the errors of each stage
+//! into the next ones. A measured value that several stages are fitted to has the same error in all. An
+//! undetermined direction z of a stage leaves its parameters free along it; later stages follow it, δu_f =
+//! −A⁻¹ J_fᵀ J_h z_h.
 //!
 //! A computed value changes by g = ∂y/∂u: its variance is s² |gᵀL|², and is unbounded where gᵀz is
 //! not 0.
@@ -185,9 +185,10 @@ impl Errors {
         (!is_open).then(|| self.by_point.row(parameter).norm_squared())
     }
 
-    /// What is known of the values of a curve that change with the parameters `of` by `gradients`, a column
-    /// for each, `None` if it cannot be computed. A change of less than `least` while a direction goes once
-    /// through the range of a parameter is none; changes that cancel leave `exactness` of the largest.
+    /// Uncertainty of the values of a curve. `gradients` has their derivatives by the parameters `of`, a
+    /// column for each, `None` if it cannot be computed. A change of less than `least` while a direction
+    /// goes once through the range of a parameter counts as zero; changes that cancel leave `exactness` of
+    /// the largest.
     pub(super) fn of_values(
         &self,
         of: &[usize],

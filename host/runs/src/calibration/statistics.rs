@@ -175,8 +175,8 @@ pub(super) fn two_sided(level: f64, degrees: Option<usize>) -> f64 {
     }
 }
 
-/// How much larger than the least a sum of squares may be for all of `n` parameters together to lie in
-/// their region of this level, relative to the variance: n F(n, ν), of known variance χ²(n).
+/// Bound of the joint confidence region of all `n` parameters at this level: the excess of the sum of
+/// squares over its minimum, relative to the variance. It is n F(n, ν), with a known variance χ²(n).
 pub(super) fn joint(level: f64, n: usize, degrees: Option<usize>) -> f64 {
     let n = n as f64;
     match degrees {

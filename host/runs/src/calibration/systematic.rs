@@ -1,12 +1,12 @@
-//! Residuals that are no noise: too far off for it, or following each other.
+//! Residuals that are not noise: too far off for it, or following each other.
 //!
-//! For all calibrations whose residuals are normal noise, at most one in a hundred is reported to have residuals too far off,
-//! and one in a hundred to have some that follow each other: each of these tests has its part of that level, divided by
-//! the points or curves that it is applied to (Bonferroni).
+//! If residuals are normal noise, at most one calibration in a hundred is reported to have residuals too far off, and
+//! one in a hundred to have some that follow each other. Each of these tests has its part of that level, divided by the
+//! points or curves that it is applied to (Bonferroni).
 //!
-//! - *Too far off*, where the file gives the noise: more than z times it, z the quantile of the normal distribution. And
-//!   whatever it gives: the generalised extreme studentised deviate (B. Rosner, Technometrics 25, 165–172, 1983), which
-//!   takes one residual after the other away and knows the scatter of those that are left. It is for 15 points at least.
+//! - *Too far off*, where the file gives the noise: more than z times it, z the quantile of the normal distribution. In
+//!   any case: the generalised extreme studentised deviate (B. Rosner, Technometrics 25, 165–172, 1983), which removes
+//!   one residual after the other and estimates the scatter of the rest. It needs at least 15 points.
 //! - *Following each other*: the correlation of neighbours r is above z/√n (R. L. Anderson, Ann. Math. Stat. 13, 1–13,
 //!   1942); there are too few runs of one sign, or too few runs of points that are too far off and of others (A. Wald &
 //!   J. Wolfowitz, Ann. Math. Stat. 11, 147–162, 1940). A fit makes neighbours rather too different than too alike, so
@@ -14,8 +14,8 @@
 
 use super::curve::Curve;
 use super::fitted::FittedCurve;
+use super::messages::digits;
 use super::statistics::{of_neighbours, two_sided};
-use super::words::digits;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// One calibration in this many.
@@ -72,7 +72,7 @@ impl Limits {
 }
 
 impl Systematic {
-    /// Of a curve with these computed values.
+    /// Tests a curve with these computed values.
     pub(super) fn of(curve: &Curve, computed: &[f64], limits: Limits) -> Self {
         let pairs = curve.points.iter().zip(computed).zip(&curve.deviations);
         let over_noise: Vec<f64> = pairs.map(|(((_, y), c), d)| (c - y) / d).collect();
@@ -117,7 +117,7 @@ impl Systematic {
         }
     }
 
-    /// What is to be reported of it.
+    /// Its findings in words.
     pub(super) fn in_words(&self, test: &str, fitted: &FittedCurve) -> Vec<String> {
         let mut words = Vec::new();
         let Curve { x, y, points, .. } = &fitted.curve;

@@ -69,10 +69,10 @@ fn directions(dimension: usize) -> [u32; DIGITS] {
     v
 }
 
-/// One coordinate of the first `n` points, from the origin on, with the digits of `shift` exchanged in all of them: a
-/// random digital shift, which keeps them as even unchanged, and takes them away from the corner of all least values
-/// (P. L'Ecuyer & C. Lemieux, "Recent advances in randomized quasi-Monte Carlo methods", in: Modeling uncertainty,
-/// Kluwer 2002, 419–474).
+/// One coordinate of the first `n` points, from the origin on, all combined with `shift` (exclusive or). This random
+/// digital shift keeps them as even, and moves them away from the corner of all least values (P. L'Ecuyer & C.
+/// Lemieux, "Recent advances in randomized quasi-Monte Carlo methods", in: Modeling uncertainty, Kluwer 2002,
+/// 419–474).
 pub(super) fn coordinate(dimension: usize, n: usize, shift: u32) -> Vec<f64> {
     let directions = directions(dimension);
     let mut x = 0_u32;

@@ -2,7 +2,7 @@
 
 use super::{CALLS, FOLDER, FOLDER_WORDS, Page, word};
 use law::Stop;
-use law::calls;
+use law::current_call;
 use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
 use std::io::{self, Write};
 use std::path::Path;
@@ -24,15 +24,15 @@ pub(super) fn begin(page: Page, watcher: Pid) -> io::Result<()> {
         return Err(io::Error::other("the watching process is gone"));
     }
     let page = PAGE.get_or_init(|| page);
-    calls::keep_in(&page.0, CALLS);
-    calls::remember_process();
+    current_call::keep_in(&page.0, CALLS);
+    current_call::remember_process();
     SKIP.store(page.get(word::SKIP), Ordering::Relaxed);
     Ok(())
 }
 
 /// Says how the process ends: the last thing it does.
 pub fn end(code: u8) {
-    calls::end_if_copy(|| {});
+    current_call::end_if_copy(|| {});
     let Some(page) = PAGE.get() else { return };
     let _ = io::stdout().flush();
     page.set(word::ENDED, u64::from(code) + 1);
@@ -55,7 +55,7 @@ pub fn case_begun(number: usize, folder: &Path) {
     if let Some(page) = PAGE.get() {
         let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
         let text = folder.to_string_lossy();
-        calls::write_text(&page.0, FOLDER, FOLDER_WORDS, &text);
+        current_call::write_text(&page.0, FOLDER, FOLDER_WORDS, &text);
         page.set(word::CASES, number as u64);
         page.set(word::RUNNING, 1);
     }
@@ -118,7 +118,7 @@ impl Write for Handed {
             SKIP.fetch_sub(skipped, Ordering::Relaxed);
             return Ok(skipped as usize);
         }
-        law::custody::restore().map_err(io::Error::other)?;
+        law::process_state::restore().map_err(io::Error::other)?;
         // No line is kept back: a law may end the process at any time.
         let mut out = io::stdout().lock();
         let n = out.write(bytes)?;

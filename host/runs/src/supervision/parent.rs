@@ -4,8 +4,8 @@
 use super::signals::Signals;
 use super::{Page, SIZE, STOPPING, child, word};
 use crate::Error;
-use law::calls::Seen;
 use law::child::{Ending, can_be_copied, copy, ending};
+use law::current_call::Seen;
 use law::{SharedMemory, isolate};
 use rustix::process::{
     Pid, Signal, WaitOptions, getpid, kill_process, set_child_subreaper, wait, waitpid,

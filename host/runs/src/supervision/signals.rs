@@ -32,7 +32,7 @@ impl Signals {
         Ok(Self { waiting, before })
     }
 
-    /// In a copy of the watcher: ends of its own children are told as to any process.
+    /// For a copy of the watcher: it sees its children end as any process does.
     ///
     /// # Errors
     /// The system's.

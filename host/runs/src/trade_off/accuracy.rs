@@ -1,25 +1,24 @@
 //! Settings that reach an accuracy: `accuracy = 0.01` in a case file.
 //!
-//! Increments are doubled from a quarter of the file's on until the estimated error of the finest
-//! run is below the target; of the runs made, the coarsest that is good enough is chosen, and where
-//! none is, the finest that came to its end. With `accuracy_with_mesh` half of the target is for that, and
-//! the rest for the mesh, which is refined until its error is below it. Every run is a
-//! row of `accuracy.csv` as soon as it is done, and kept, so that a study that is stopped goes on from
-//! there.
+//! Increments are doubled from a quarter of the file's on until the estimated error of the finest run is
+//! below the target. The coarsest run that is good enough is chosen, else the finest that came to its end.
+//! With `accuracy_with_mesh` half of the target is for that, and the rest for the mesh, which is refined
+//! until its error is below it. Every run is a row of `accuracy.csv` as soon as it is done, and kept, so
+//! that a study that is stopped goes on from there.
 
 mod levels;
 mod mesh;
+pub(super) mod messages;
 mod search;
 mod table;
-pub(super) mod words;
 
-use super::kept::Kept;
 use super::scheme::Values;
 use super::trial::Scratch;
+use super::trial_cache::Kept;
 use crate::Error;
 use crate::run::{Observer, Options, identity_of, run_reusing};
 use input::Case;
-use input::chosen::{Chosen, Verdict};
+use input::accuracy_settings::{AccuracySettings, Verdict};
 use input::material::ParameterValue;
 use law::Stop;
 use mechanics::equilibrium::Reuse;
@@ -59,7 +58,7 @@ pub fn run_accurately(
     })
     .map_err(of_trials)?;
     let case = studied.as_ref().unwrap_or(case);
-    match case.file.chosen.as_ref().map(words::outcome) {
+    match case.file.chosen.as_ref().map(messages::outcome) {
         Some(Ok(reached)) => observer.note(&reached),
         Some(Err(short)) => observer.warning(&short),
         None => (),
@@ -143,7 +142,7 @@ pub fn reach_until(
         let name = phase.name.get_ref().clone();
         (name, *phase.increments.get_ref())
     });
-    chosen.file.chosen = Some(Chosen {
+    chosen.file.chosen = Some(AccuracySettings {
         asked,
         reached,
         without_mesh,

@@ -1,10 +1,10 @@
 //! The study of a case: one setting at a time away from the file's, and some together.
 
-use super::accuracy::words;
+use super::accuracy::messages;
 use super::clock::cpu_seconds;
 use super::driver_study::in_one_line;
 use super::expected::Expected;
-use super::pace::in_words;
+use super::progress::in_words;
 use super::sampled::{Convergence, Sampled};
 use super::scheme::{Scheme, Values, schemes};
 use super::study::{Done, Measurement, Reference, Row, Study};
@@ -144,7 +144,7 @@ pub(super) fn study(
     let zero = path.rows.zero();
     study
         .notes
-        .extend((!zero.is_empty()).then(|| words::zero(&zero)));
+        .extend((!zero.is_empty()).then(|| messages::zero(&zero)));
     study.notes.extend(path.leave_out_round_off(&mut scale));
     reference.convergence = path.convergence(&scale);
     study.references.push(reference);

@@ -1,7 +1,7 @@
 //! CPU time.
 
-/// CPU time of the process so far, all threads together, s. Where the system does not tell, the
-/// time of the wall clock.
+/// CPU time of the process so far, all threads together, s; wall-clock time if the system does not
+/// report it.
 #[cfg(unix)]
 pub(super) fn cpu_seconds() -> f64 {
     use rustix::time::{ClockId, clock_gettime};
@@ -9,8 +9,8 @@ pub(super) fn cpu_seconds() -> f64 {
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
-/// CPU time of the process so far, all threads together, s. Where the system does not tell, the
-/// time of the wall clock.
+/// CPU time of the process so far, all threads together, s; wall-clock time if the system does not
+/// report it.
 #[cfg(not(unix))]
 pub(super) fn cpu_seconds() -> f64 {
     use std::sync::OnceLock;

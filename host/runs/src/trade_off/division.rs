@@ -7,10 +7,10 @@ use mechanics::mesh::{Mesh, Solid};
 use mechanics::problem::Formulation;
 use toml::Spanned;
 
-/// Divides sides of elements by a whole number: columns and rows of a grid, so that the lines of the
-/// given mesh stay; elements of a file by halving their sides until there are that many parts. Parts
-/// across a thin layer of a grid keep their number: the thickness of a layer is its element's. With
-/// such a layer a file is not divided.
+/// Divides sides of elements by a whole number. In a grid columns and rows are divided, so that the
+/// lines of the given mesh stay. Elements of a file have their sides halved until there are that
+/// many parts. Across a thin layer of a grid the number of elements stays: the thickness of a layer
+/// is its element's. A file with such a layer is not divided.
 ///
 /// # Errors
 /// Those of building the mesh.

@@ -1,7 +1,7 @@
 //! The study of a driver: increments per segment × integration scheme of the law.
 
 use super::clock::seconds_of_a_call;
-use super::pace::Pace;
+use super::progress::Pace;
 use super::sampled::Sampled;
 use super::scheme::{Scheme, schemes};
 use super::study::{Done, Measurement, ROWS, Reference, Row, Study};

@@ -1,13 +1,13 @@
 //! Search for the stiffness of a zero-thickness interface.
 //!
-//! The stiffness is in the place of a penalty: too small, and the interface gives; too large, and
-//! the equations suffer. Proposed is K_n = f E_oed/h, K_t = f G/h, where E_oed, G and h are the
-//! oedometric modulus, the shear modulus and the size across of the element next to the interface,
-//! on the softer side. Stiffness parameters of the law are found by trial: those with the unit of a
-//! stiffness that scale the elastic operator.
+//! The stiffness acts as a penalty: too small, and the interface gives; too large, and the
+//! equations are badly conditioned. The proposal is K_n = f E_oed/h, K_t = f G/h. Here E_oed, G and
+//! h are the oedometric modulus, the shear modulus and the size across of the element next to the
+//! interface, on the softer side. Stiffness parameters of the law are found by trial: those with
+//! the unit of a stiffness that scale the elastic operator.
 
 use super::case_study::refuse_without_probes;
-use super::pace::Pace;
+use super::progress::Pace;
 use super::sampled::Sampled;
 use super::scheme::{Values, short};
 use super::trial::{Scratch, Settings, Timing, measure};
@@ -22,7 +22,7 @@ use mechanics::equilibrium::Reuse;
 use mechanics::group::Group;
 use mechanics::mesh::Joint;
 use mechanics::problem::Formulation;
-use results::wanted::{Output, When};
+use results::output_request::{Output, When};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;

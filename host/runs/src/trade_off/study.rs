@@ -15,8 +15,8 @@ pub struct Study {
     pub columns: Vec<String>,
     /// Names of the counts.
     pub counts: &'static [&'static str],
-    /// What errors are measured against. The first holds for settings that leave the model (mesh,
-    /// elements) unchanged.
+    /// References for errors. The first holds for settings that leave the model (mesh, elements)
+    /// unchanged.
     pub references: Vec<Reference>,
     /// Settings.
     pub rows: Vec<Row>,
@@ -27,7 +27,7 @@ pub struct Study {
 /// Takes a study whenever a row is done.
 pub(super) type Done<'a> = dyn FnMut(&Study) -> Result<(), crate::Error> + 'a;
 
-/// What errors are measured against.
+/// A reference for errors.
 #[derive(Clone, Debug)]
 pub struct Reference {
     /// Settings in words.

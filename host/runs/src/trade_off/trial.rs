@@ -2,10 +2,10 @@
 
 use super::clock::cpu_seconds;
 use super::division::divide;
-use super::kept::Kept;
-use super::pace::in_words;
+use super::progress::in_words;
 use super::sampled::Sampled;
 use super::scheme::{Values, short};
+use super::trial_cache::Kept;
 use crate::Error;
 use crate::run::{Observer, run};
 use input::Case;
@@ -15,7 +15,7 @@ use mechanics::Place;
 use mechanics::Settings as Solver;
 use mechanics::problem::{Formulation, Integration};
 use mechanics::settings::{Control, Convergence, Equations, Method};
-use results::wanted::Output;
+use results::output_request::Output;
 use serde_json::Value;
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};

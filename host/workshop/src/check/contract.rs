@@ -1,9 +1,9 @@
 //! Do the functions answer as the contract says, to the host's mistakes too?
 
+use super::loading_path::Refused;
 use super::random::Random;
 use super::specimen::{Draw, create_form, draw_all, first_difference, hypotheses};
-use super::walk::Refused;
-use super::{Check, Family, Found, Subject, Verdict, course, failed, refusal, status_name};
+use super::{Check, Family, Found, Subject, Verdict, author_path, failed, refusal, status_name};
 use abi::raw;
 use abi::status::{Outcome, most_severe};
 use abi::version::BATCH_SIZE_1_0;
@@ -337,7 +337,7 @@ fn initial_states_are_written(subject: &Subject) -> Found {
 }
 
 fn integrate_works(subject: &Subject) -> Found {
-    course::is_followed(subject)?;
+    author_path::is_followed(subject)?;
     let mut random = Random::new(subject.seed, "integrate");
     let (mut n_successes, mut n) = (0, 0);
     for specimen in subject.specimens(2, &mut random)? {

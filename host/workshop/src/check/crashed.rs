@@ -5,7 +5,7 @@ use crate::Error;
 use crate::replay::{library, probed};
 use law::capsule::{Capsule, LibraryCapsule, status};
 use law::child::{self, Work};
-use law::probe::kept::{Kept, KeptCall, KeptPhase};
+use law::probe::call_log::{Kept, KeptCall, KeptPhase};
 use std::ffi::OsString;
 use std::path::Path;
 use std::time::Duration;

@@ -1,9 +1,9 @@
 //! Do parameters mean something, and numbers what their units say?
 
+use super::loading_path::Step;
 use super::mathematics::{ITERATED, NEEDS, UPDATE, flux_scale, increment, largest};
 use super::random::Random;
 use super::specimen::{Specimen, create_form, is_same, is_success};
-use super::walk::Step;
 use super::{Check, Family, Found, Subject, Verdict, skipped};
 use abi::raw;
 use law::ParameterDescription;

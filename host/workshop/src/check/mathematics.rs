@@ -2,16 +2,16 @@
 
 mod axes;
 mod rates;
-mod rest;
 mod signs;
 mod tangent;
+mod zero_strain;
 
 pub(super) use axes::own_random;
-pub(super) use rest::counts;
 pub(super) use tangent::{Slope, slope};
+pub(super) use zero_strain::counts;
 
+use super::loading_path::Step;
 use super::specimen::Specimen;
-use super::walk::Step;
 use super::{Check, Family, Verdict};
 use abi::raw;
 use law::probe::PointStart;
@@ -70,7 +70,7 @@ pub(super) const CHECKS: &[Check] = &[
                       over too; laws that depend on time are passed over, and variables that count or \
                       are a rate.",
         needs: NEEDS,
-        run: rest::zero_increment_changes_nothing,
+        run: zero_strain::zero_increment_changes_nothing,
     },
     Check {
         id: "initial-states-fit",
@@ -78,7 +78,7 @@ pub(super) const CHECKS: &[Check] = &[
         description: "Where `init_state` makes internal variables fit the initial flux, an increment of \
                       zero keeps both (warning, since a flux may be more than a law carries).",
         needs: NEEDS,
-        run: rest::initial_states_fit,
+        run: zero_strain::initial_states_fit,
     },
     Check {
         id: "hypotheses-agree",

@@ -1,9 +1,9 @@
 //! Is an update a function of its arguments, and of nothing else?
 
-mod afresh;
 mod arguments;
-mod earlier;
+mod earlier_calls;
 mod environment;
+mod fresh_process;
 
 use super::random::Random;
 use super::specimen::{Function, Specimen, first_difference, is_same};
@@ -80,7 +80,7 @@ pub(super) const CHECKS: &[Check] = &[
         description: "An instance gives the same bits while others with other parameters are \
                       created, used and destroyed.",
         needs: &["repeatable"],
-        run: earlier::instances_are_independent,
+        run: earlier_calls::instances_are_independent,
     },
     Check {
         id: "independent-of-earlier-calls",
@@ -89,7 +89,7 @@ pub(super) const CHECKS: &[Check] = &[
                       parameter, request or the time increment, by a half or by 10⁻⁹, and in an \
                       instance that stands where another one stood.",
         needs: &["instances-are-independent"],
-        run: earlier::independent_of_earlier_calls,
+        run: earlier_calls::independent_of_earlier_calls,
     },
     Check {
         id: "independent-of-first-instance",
@@ -97,14 +97,14 @@ pub(super) const CHECKS: &[Check] = &[
         description: "An instance gives the same bits after another one with other parameters as it gives as the \
                       first one of a process of its own: no `static` is set by whoever comes first.",
         needs: &["independent-of-order", "independent-of-earlier-calls"],
-        run: afresh::independent_of_first_instance,
+        run: fresh_process::independent_of_first_instance,
     },
     Check {
         id: "independent-of-environment",
         family: Family::Purity,
         description: "A process with another HOME, LANG, LC_ALL, TZ, USER and LOGNAME gives the same bits.",
         needs: &["independent-of-first-instance"],
-        run: afresh::independent_of_environment,
+        run: fresh_process::independent_of_environment,
     },
     Check {
         id: "environment-is-left-alone",

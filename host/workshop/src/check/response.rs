@@ -1,7 +1,8 @@
 //! Checks of a response without its equations: jumps, convergence in smaller increments, validity
 //! of the elastic operator.
 
-use super::extent::beyond_elastic;
+use super::coverage::beyond_elastic;
+use super::loading_path::Step;
 use super::margins;
 use super::mathematics::{
     ELASTIC, ITERATED, NEEDS, ROUND_OFF, UPDATE, counts, depends_on_time, flux_scale, increment,
@@ -9,7 +10,6 @@ use super::mathematics::{
 };
 use super::random::Random;
 use super::specimen::{INSTANT, Specimen, is_finite, is_success};
-use super::walk::Step;
 use super::{Check, Family, Found, Subject, Verdict, skipped};
 use abi::raw;
 use law::Tangent;

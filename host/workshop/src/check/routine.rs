@@ -4,29 +4,29 @@
 //! Every call goes through the adapter of a run, guard words included, in the process of the check.
 
 mod axes;
-mod beside;
-mod first;
-mod rest;
+mod messages;
+mod outside_reads;
+mod phase_start;
 mod tangent;
 mod time;
-mod words;
+mod zero_strain;
 
+use super::loading_path::{Refused, Step};
 use super::mathematics::{UPDATE, largest};
 use super::random::Random;
 use super::specimen::{LONG, Specimen, first_difference, is_success};
-use super::walk::{Refused, Step};
-use super::{Check, Family, Found, Subject, Verdict, course, refusal, skipped};
+use super::{Check, Family, Found, Subject, Verdict, author_path, refusal, skipped};
 use crate::Error;
 use abi::raw;
 use abi::status::Outcome;
-use beside::reads_beside;
 use law::adapter::{Adapter, sidecar, sidecar_of};
 use law::probe::{Form, PointEnd, PointStart};
-use law::vetting::plausible;
+use law::trial::plausible;
 use law::{Bounds, LoadedLaw, Site};
+use messages::{Words, advice};
+use outside_reads::reads_beside;
 use std::path::Path;
 use text::{Source, suggestion};
-use words::{Words, advice};
 
 pub(super) const CHECKS: &[Check] = &[
     Check {
@@ -73,7 +73,7 @@ pub(super) const CHECKS: &[Check] = &[
                       Where a routine depends on the time, TIME(1) is a warning. After a call of another step the usual \
                       one, made twice, gives the same both times.",
         needs: &["routine-is-repeatable"],
-        run: first::routine_does_not_begin_again,
+        run: phase_start::routine_does_not_begin_again,
     },
     Check {
         id: "routine-stays-at-rest",
@@ -81,7 +81,7 @@ pub(super) const CHECKS: &[Check] = &[
         description: "UMAT: after an update, DSTRAN = 0 keeps STRESS; routines that depend on the time are \
                       passed over.",
         needs: &["routine-is-repeatable"],
-        run: rest::routine_stays_at_rest,
+        run: zero_strain::routine_stays_at_rest,
     },
     Check {
         id: "time-as-declared",
@@ -299,7 +299,7 @@ fn under_pressure(routine: &Specimen) -> Result<PointStart, Verdict> {
 }
 
 fn routine_answers(subject: &Subject) -> Found {
-    course::is_followed(subject)?;
+    author_path::is_followed(subject)?;
     let mut random = Random::new(subject.seed, "answers");
     let mut all = Vec::new();
     for routine in subject.specimens_by_default(1, &mut random)? {

@@ -1,13 +1,13 @@
 //! Laws with sample parameters, or with those of the author's own driver.
 
+use super::loading_path::Origin;
 use super::random::Random;
-use super::walk::Origin;
 use super::{Found, Subject, Verdict, failed, refusal};
 use abi::Hypothesis;
 use abi::raw;
 use abi::status::Outcome;
 use law::capsule::Capsule;
-use law::probe::{Answer, CreateForm, Form, PointEnd, PointStart, Probe, kept};
+use law::probe::{Answer, CreateForm, Form, PointEnd, PointStart, Probe, call_log};
 use law::{
     BatchFailure, FormulationDescription, LoadedLaw, Moment, Operator, ParameterDescription,
     PointCall, Request, Site,
@@ -111,7 +111,7 @@ pub(super) enum Draw {
 /// A value for a parameter.
 fn draw(p: &ParameterDescription, random: &mut Random, how: Draw) -> f64 {
     if how == Draw::Plausible {
-        return law::vetting::plausible(p);
+        return law::trial::plausible(p);
     }
     let is_first = how == Draw::Ordinary;
     if let Some(default) = p.default {
@@ -433,7 +433,7 @@ impl Specimen {
             &self.formulation,
             (self.hypothesis, &self.values),
             (
-                kept::Function::InitState,
+                call_log::Function::InitState,
                 Form {
                     request: 0,
                     ..*form

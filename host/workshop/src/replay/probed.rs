@@ -5,7 +5,7 @@ use crate::Error;
 use crate::check::specimen::{create_form, first_difference, is_success};
 use law::capsule::Capsule;
 use law::child::{self, Ending, Work};
-use law::probe::kept::Function;
+use law::probe::call_log::Function;
 use law::probe::{Answer, Created, Form, PointEnd, PointStart, Probe};
 use law::{LoadedLaw, Opener, Trust};
 use std::path::{Path, PathBuf};
@@ -63,8 +63,8 @@ pub(super) fn outside(
     Err(fails())
 }
 
-/// What the call of a capsule gives in a process that does nothing else, with these variables of its environment:
-/// a line of each point, or how a call ends that gives no results.
+/// Repeats the call of a capsule in a process that does nothing else, with these environment variables. Returns a
+/// line for each point, or how a call without results ended.
 ///
 /// # Errors
 /// There is no process, or the capsule cannot be used.

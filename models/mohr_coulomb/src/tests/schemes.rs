@@ -184,11 +184,11 @@ fn the_tangent_is_the_continuum_one() {
 }
 
 /// Every scheme ends near the surface with finite numbers. The explicit one has no reason to refuse. The
-/// other may, where two principal stresses are equal where the flow starts or ends: there the axes turn
-/// at a rate without bound, `G γ/(s_i − s_j)`, and the error of a step does not fall with its square, nor
-/// has a relative error a meaning at an apex without stress. If the three stay apart, about
-/// `√(‖σ''‖/(2 ‖σ‖ ε_s))` steps suffice, far below the 10 000 that it has. So that success is no matter
-/// of chance, states are drawn until a hundred have had to succeed, fifty by each scheme at least.
+/// other may, if two principal stresses are equal where the flow starts or ends. There the axes turn at a
+/// rate without bound, `G γ/(s_i − s_j)`, and the error of a step does not fall with its square. At an
+/// apex without stress a relative error has no meaning. If the three stay apart, about `√(‖σ''‖/(2 ‖σ‖
+/// ε_s))` steps suffice, far below the 10 000 that it has. So that success is no matter of chance, states
+/// are drawn until a hundred have had to succeed, fifty by each scheme at least.
 #[test]
 fn stands_random_states() {
     let mut random = Random(5);

@@ -79,8 +79,8 @@ fn agrees_with_differences_in_each_zone() {
 }
 
 /// Random parameters and states of size 1: a probe of 1e-5 rounds at 1e-11 and truncates at
-/// (1e-5/gap)²; where it comes near another zone or two principal values come within 0.02 but
-/// differ, the state is left out.
+/// (1e-5/gap)². States are left out if the probe comes near another zone, or two principal values
+/// come within 0.02 but differ.
 #[test]
 fn agrees_with_differences_over_random_states() {
     let mut random = Random(3);

@@ -1,8 +1,8 @@
 //! Sections of formats 4.1 and 4.0.
 //!
-//! They differ in little: 4.0 counts no largest and smallest numbers, names the entity of a block before its dimension,
-//! gives the box of a point two corners, has the number of a node next to its coordinates, and writes numbers of nodes and
-//! elements in 4 bytes.
+//! They differ little. 4.0 omits the largest and smallest numbers, names the entity of a block before its dimension,
+//! and gives the box of a point two corners. It has the number of a node next to its coordinates, and writes numbers of
+//! nodes and elements in 4 bytes.
 
 use super::{Element, Fault, MOST_NODES, Reader, Version};
 

@@ -160,7 +160,7 @@ fn the_middle_of_nine_nodes_is_left_out() {
     );
 }
 
-/// Mistakes of first order are told as others are.
+/// Mistakes in elements of first order are reported like others.
 #[test]
 fn mistakes_are_told() {
     let says = |change: &dyn Fn(&mut Model), says: &str| {

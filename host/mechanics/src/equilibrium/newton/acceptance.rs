@@ -1,33 +1,30 @@
 //! When a state counts as equilibrium.
 //!
-//! Two criteria, body by body: the residual relative to the forces in play, and the last correction
-//! relative to the increment of the displacements. Both references come from the iterate itself,
-//! so an iterate that runs away would widen its own tolerances: pressures of 10⁹ kPa in elements
-//! without stiffness excuse a residual of many kN, and a correction of 10¹⁰ m is small compared
-//! with an increment of 10¹⁰ m. Therefore neither reference may exceed what is given by more than a
-//! factor:
+//! Two criteria, body by body: the residual relative to the forces in play, and the last correction relative to the
+//! increment of the displacements. Both references come from the iterate itself, so an iterate that runs away would
+//! widen its own tolerances. Pressures of 10⁹ kPa in elements without stiffness would excuse a residual of many kN, and
+//! a correction of 10¹⁰ m is small compared with an increment of 10¹⁰ m. Therefore neither reference may exceed given
+//! values by more than a factor:
 //!
-//! - forces: those at the start of the phase, those of the last equilibrium, the loads, and the
-//!   forces that the step calls forth elastically,
-//! - displacements: those that were predicted, from the last steps or by elasticity.
+//! - Forces: those at the start of the phase, those of the last equilibrium, the loads, and those of the elastic
+//!   response to the step.
+//! - Displacements: those predicted from the last steps or by elasticity.
 //!
-//! Stresses that follow a yield surface are smaller than elastic ones. Those that exceed them are
-//! raised by dilatancy against a stiff neighbour or by a stiffness that grows with pressure; a
-//! factor of ten ([`FORCES`]) leaves room for them, and costs at most one digit of what the
-//! tolerance means. If the forces rise farther in one step, the criterion is only stricter.
+//! Stresses on a yield surface are smaller than elastic ones. Larger ones arise from dilatancy against a stiff
+//! neighbour or from a stiffness that grows with pressure. A factor of ten ([`FORCES`]) leaves room for them, and costs
+//! at most one digit of the tolerance. If the forces rise farther in one step, the criterion is only stricter.
 
 use super::round_off::ROUND_OFF;
 
 /// The displacement criterion is waived where the residual is this far below its tolerance: a
 /// linear step ends after one correction, which is as large as the increment itself.
 pub(super) const EXACT: f64 = 1e-3;
-/// Share of the tolerances that a correction with a matrix that is kept, and the residual it leaves, must not exceed;
-/// none is waived then.
+/// Share of the tolerances that a correction with a kept matrix, and the residual it leaves, must not exceed; neither
+/// is waived then.
 pub(super) const STALE: f64 = 0.1;
 /// The residual is measured against at most this multiple of the forces that are given.
 pub(super) const FORCES: f64 = 10.0;
-/// Displacements beyond this multiple of the predicted ones are no measure of a correction, and a
-/// correction beyond it is never waived.
+/// A correction is measured against at most this multiple of the predicted displacements, and never waived beyond it.
 pub(super) const MOVES: f64 = 100.0;
 
 /// Forces and displacements of a body, as they are given to a step and as an iterate has them.
@@ -39,7 +36,7 @@ pub(super) struct Forces {
     pub(super) imposed: f64,
     /// Internal forces of the last equilibrium.
     pub(super) last: f64,
-    /// Forces that the step calls forth elastically; `None` if it has no elastic answer.
+    /// Forces of the elastic response to the step; `None` without one.
     pub(super) elastic: Option<f64>,
     /// If no force has ever acted, smaller forces count as zero.
     pub(super) floor: f64,
@@ -88,8 +85,8 @@ impl Change {
 pub(super) struct Criteria {
     pub(super) force: f64,
     pub(super) displacement: f64,
-    /// To a matrix that is kept a part that has yielded since still looks stiff: its corrections are smaller than what
-    /// is left.
+    /// The matrix is kept: a part that has yielded since still looks stiff to it, so corrections are smaller than the
+    /// error.
     pub(super) is_stale: bool,
 }
 
@@ -107,8 +104,8 @@ pub(super) struct Measures {
 }
 
 impl Measures {
-    /// Whether the residual is so small that the correction says nothing more. That may be round-off of the forces
-    /// in play, where the tolerance is near it: of a body that has no reason to move the increment is round-off, too,
+    /// Whether the residual is so small that the correction adds no information. If the tolerance is near round-off of
+    /// the forces in play, such a residual counts too: in a body that need not move, the increment is also round-off
     /// and does not measure corrections.
     pub(super) fn is_exact(&self, criteria: Criteria) -> bool {
         let exact = (EXACT * criteria.force).max(ROUND_OFF.min(criteria.force));

@@ -1,6 +1,6 @@
 //! Why a step failed, as data.
 
-mod words;
+mod messages;
 
 use super::outcome::Iteration;
 use crate::equilibrium::mechanism::Mechanism;

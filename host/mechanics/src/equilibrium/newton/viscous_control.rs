@@ -1,35 +1,36 @@
-//! Viscous control: from a step that Newton iterations cannot finish to an equilibrium, on the path of a body that comes to rest.
+//! Viscous control: from a step that Newton iterations cannot finish to an equilibrium, on the path of a body that
+//! comes to rest.
 //!
-//! As in [viscous relaxation](super::relaxation) a real body's motion to the next stable equilibrium is
-//! followed where no branch of equilibria goes on. There one increment is tried again and again
-//! from the last equilibrium; here the motion is a path. Beside the stress of the law stands an overstress of Duvaut–Lions' kind (G. Duvaut, J. L. Lions 1972; J. C.
+//! As in [viscous relaxation](super::viscous_relaxation) a real body's motion to the next stable equilibrium is followed where
+//! no branch of equilibria continues. Relaxation repeats one increment from the last equilibrium; here the motion is a
+//! path. The stress of the law gets an additional overstress of Duvaut–Lions type (G. Duvaut, J. L. Lions 1972; J. C.
 //! Simo, J. G. Kennedy, S. Govindjee, Int. J. Numer. Meth. Engng 26, 1988),
 //!
 //!   σ = σ_law + s, ṡ = D_e ε̇ − σ̇_law − s/τ,
 //!
-//! whose nodal forces are what σ_law leaves out of balance, r. An implicit step of time Δt, in which
-//! α = τ/Δt, from the committed state on is
+//! whose nodal forces are the residual r of σ_law. With α = τ/Δt an implicit step of time Δt from the committed state
+//! is
 //!
 //!   r(Δu) = α (K_e Δu − Δf),    tangent K + α K_e,
 //!
-//! with the step's change Δf of the forces in the first one and none afterwards, while the body
-//! comes to rest. Every viscous step is solved and **its state committed**: laws see the path of a
-//! viscous body to its equilibrium, not one increment tried again and again. Above
-//! α = (1/cos θ − 1)/2, θ the angle between yield and flow in energy, a step's matrix is positive definite
-//! and its answer the only one; if a viscous step is linear, nothing yields or unloads any more,
-//! and α falls, finally to zero: a Newton correction. The same tolerances decide. The accepted
-//! state is an equilibrium of the laws alone, without overstress.
-
-//! Where a point breaks off what it carries a viscous step may have no answer: whole, the point opens; open, what it no longer carries
-//! moves the body so that it closes, and its law, which sees the one increment from the start of the viscous step, finds it
-//! whole. Iterations alternate between both, with any viscosity and however short the step. A real point stays broken. So
-//! where nothing else is left each viscous step is **one correction**, and the state it leads to is committed, whatever it leaves:
-//! what has broken stays so, what is out of balance then drives the next one, and α follows the residual as in viscous relaxation.
+//! with the step's change Δf of the forces in the first viscous step and zero afterwards, while the body comes to rest.
+//! Every viscous step is solved and **its state committed**: laws see the path of a viscous body to its equilibrium.
+//! Let θ be the angle between yield and flow in energy. Above α = (1/cos θ − 1)/2 a step's matrix is positive definite
+//! and its solution unique. If a viscous step is linear, nothing yields or unloads any more, and α falls, finally to
+//! zero: a Newton correction. The same tolerances decide. The accepted state is an equilibrium of the laws alone,
+//! without overstress.
+//!
+//! If a point loses its traction by breaking, a viscous step may have no solution. Intact, the point opens. Open, the
+//! force it no longer carries moves the body so that it closes; its law sees one increment from the start of the
+//! viscous step and finds it intact. Iterations alternate between both, with any viscosity and however short the step.
+//! A real point stays broken. So as the last resort each viscous step is **one correction**, and its state is committed
+//! whatever the residual. Broken points stay broken, the residual drives the next step, and α follows it as in viscous
+//! relaxation.
 
 use super::failure::{Iterations, Reason, StepFailure};
 use super::outcome::Iteration;
-use super::relaxation::{follows, stands_still};
 use super::residual::{Balance, Task};
+use super::viscous_relaxation::{follows, stands_still};
 use super::{Newton, norm};
 use crate::assembly::norms;
 use crate::settings::{Control, Settings};
@@ -51,8 +52,8 @@ const FEW: usize = 3;
 /// tolerance.
 const INNER: f64 = 0.1;
 const NEGLIGIBLE: f64 = 0.3;
-/// If one correction was enough, α falls by the factor; if it is then below its first value, a viscous step that is
-/// not as easy is taken back.
+/// If one correction was enough, α falls by the factor; if it is then below its first value, a harder viscous step is
+/// repeated with a larger one.
 const FALLS: f64 = 0.3;
 /// α below this counts as none.
 const LEAST: f64 = 1e-3;

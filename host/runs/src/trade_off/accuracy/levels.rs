@@ -1,10 +1,10 @@
 //! Runs of one case that differ in how finely one thing is divided, and what they tell about the error of
 //! the finest.
 //!
-//! With an error that falls as h^p, h = 1/n, three runs tell p and the error of the finest, whatever their n:
-//! runs in between may be missing. An error below the difference of the two finest is not claimed: over a gap it
-//! would rest on the order alone. Of increments each phase has to differ in all three, unless it is linear: the file's
-//! two, one and again one tell as little of a phase as two runs do.
+//! With an error that falls as h^p, h = 1/n, three runs give p and the error of the finest, whatever their n: runs in
+//! between may be missing. An error below the difference of the two finest is not claimed: over a gap it would rest on
+//! the order alone. Increments must differ in all three for each phase that is not linear: two, one and again one
+//! increment in a phase give no more than two runs do.
 
 use super::super::sampled::NOISE;
 use super::super::trial::Trial;

@@ -1,12 +1,12 @@
 //! The error of the mesh, from uniform refinements.
 
-use super::super::pace::in_words;
+use super::super::progress::in_words;
 use super::super::trial::{Settings, Timing};
 use super::levels::{Levels, ORDERS};
 use super::search::Search;
-use super::{STUDY, words};
+use super::{STUDY, messages};
 use crate::Error;
-use input::chosen::ChosenMesh;
+use input::accuracy_settings::ChosenMesh;
 use std::time::Duration;
 
 /// Divisions of the sides of elements, coarse to fine.
@@ -53,7 +53,7 @@ pub(super) fn refine(
         };
         let expected = last * dearer;
         if expected > left {
-            why = Some(words::too_long(division, [expected, left].map(in_words)));
+            why = Some(messages::too_long(division, [expected, left].map(in_words)));
             break;
         }
         search.begin(&finer, Some([expected, left]));
@@ -64,7 +64,7 @@ pub(super) fn refine(
             Ok(trial) => trial,
             Err(error) => {
                 search.failed(&finer, &error)?;
-                why = Some(words::mesh_failed(division));
+                why = Some(messages::mesh_failed(division));
                 break;
             }
         };
@@ -83,8 +83,8 @@ pub(super) fn refine(
     }
     let (difference, worst) = (levels.difference(), levels.worst());
     let estimate = match levels.growth() {
-        Some(differences) => words::mesh_diverges(levels.len(), differences, why),
-        None => words::mesh_estimate(levels.len(), ORDERS, why),
+        Some(differences) => messages::mesh_diverges(levels.len(), differences, why),
+        None => messages::mesh_estimate(levels.len(), ORDERS, why),
     };
     let of_finest = error(&levels);
     let none = || Error::internal("the run on the file's mesh is lost".to_owned());

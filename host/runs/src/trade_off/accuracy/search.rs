@@ -2,15 +2,15 @@
 
 use super::super::case_study::{LONG, law_schemes};
 use super::super::driver_study::in_one_line;
-use super::super::pace::in_words;
+use super::super::progress::in_words;
 use super::super::scheme::Scheme;
 use super::super::trial::{Scratch, Settings, Timing, Trial};
 use super::STUDY;
 use super::levels::{Levels, ORDERS};
+use super::messages;
 use super::table::Table;
-use super::words;
 use crate::Error;
-use input::chosen::FailedTrial;
+use input::accuracy_settings::FailedTrial;
 use input::{Case, Kind};
 use std::time::Instant;
 
@@ -75,7 +75,7 @@ impl Search<'_> {
         let schemes: Vec<(String, Scheme)> = if good(&best.1) {
             Vec::new()
         } else if as_in_file > LONG {
-            (self.say)(&words::no_schemes(as_in_file));
+            (self.say)(&messages::no_schemes(as_in_file));
             Vec::new()
         } else {
             (self.say)(&format!("{STUDY}: which schemes of the laws there are"));
@@ -206,7 +206,7 @@ impl Search<'_> {
             setting: settings.label(),
             reason: in_one_line(error),
         };
-        (self.say)(&words::failed(self.runs, &failed));
+        (self.say)(&messages::failed(self.runs, &failed));
         self.failed.push(failed);
         Ok(())
     }
@@ -226,8 +226,8 @@ impl Search<'_> {
         let cut_back = levels.cut_back();
         let of_finest = levels.error();
         let estimate = match (levels.next(), of_finest) {
-            (Some((next, _)), Some(_)) => words::estimate([*next, *finest_factor], ORDERS[1]),
-            _ => words::no_estimate(levels.len()),
+            (Some((next, _)), Some(_)) => messages::estimate([*next, *finest_factor], ORDERS[1]),
+            _ => messages::no_estimate(levels.len()),
         };
         let (factor, trial, error) = levels.take(of_finest, SHARES[0] * self.asked)?;
         Some(Found {

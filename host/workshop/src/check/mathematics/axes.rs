@@ -1,10 +1,10 @@
 //! Do hypotheses agree, and does the response turn with the axes?
 
 use super::{ELASTIC, ITERATED, ROUND_OFF, UPDATE, flux_scale, largest};
+use crate::check::loading_path::{Origin, Step, sum};
 use crate::check::margins;
 use crate::check::random::Random;
 use crate::check::specimen::{Specimen, create_form, enlarged, hypotheses, is_success};
-use crate::check::walk::{Origin, Step, sum};
 use crate::check::{Found, Subject, Verdict, skipped};
 use abi::Hypothesis;
 use abi::raw;

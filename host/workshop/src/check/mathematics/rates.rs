@@ -1,9 +1,9 @@
 //! Are rates the derivative of the update?
 
 use super::{LENGTHS, increment, largest};
+use crate::check::loading_path::Step;
 use crate::check::random::Random;
 use crate::check::specimen::{Specimen, create_form, is_success};
-use crate::check::walk::Step;
 use crate::check::{Found, Subject, Verdict, refusal, skipped};
 use abi::raw;
 use law::probe::{Form, PointRates, PointStart};

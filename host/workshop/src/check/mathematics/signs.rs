@@ -1,9 +1,9 @@
 //! Are signs, angles and work what they are meant to be?
 
 use super::{ELASTIC, ITERATED, ROUND_OFF, depends_on_time, flux_scale, increment, largest};
+use crate::check::loading_path::Origin;
 use crate::check::random::Random;
 use crate::check::specimen::{Specimen, create_form, is_success};
-use crate::check::walk::Origin;
 use crate::check::{Found, Subject, Verdict, skipped};
 use abi::raw;
 use law::probe::PointStart;

@@ -1,10 +1,10 @@
 //! Is the consistent tangent the derivative of the update, symmetric and constant where that is declared?
 
 use super::{ELASTIC, LENGTHS, ROUND_OFF, flux_scale, increment, largest};
+use crate::check::loading_path::Step;
 use crate::check::margins;
 use crate::check::random::Random;
 use crate::check::specimen::{Specimen, is_success};
-use crate::check::walk::Step;
 use crate::check::{Found, Subject, Verdict, skipped};
 use abi::raw;
 use law::Tangent;
@@ -13,8 +13,8 @@ use std::collections::BTreeMap;
 
 /// Error of a tangent, relative to the largest stiffness. Differences are good to 10⁻⁶ or so.
 const TANGENT: f64 = 1e-4;
-/// Roundings of a flux, each of half a unit of the largest term in play, that two sides of a difference may
-/// have between them: a component of a solid is a sum of six terms.
+/// Roundings of a flux that the two sides of a difference may have together, each of half a unit in the
+/// last place of the largest term. A component of a solid is a sum of six terms.
 const NOISE: f64 = 6.0;
 
 /// What differences say of a tangent.

@@ -112,7 +112,7 @@ pub(super) fn environment_is_left_alone(subject: &Subject) -> Found {
     if let Some(what) = before.changed(&Environment::now()) {
         return Err(failed(what));
     }
-    match law::custody::remarks().pop() {
+    match law::process_state::remarks().pop() {
         None => Ok(String::new()),
         Some(remark) => Err(Verdict::Warning(remark)),
     }

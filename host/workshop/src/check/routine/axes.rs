@@ -1,6 +1,6 @@
 //! Does a routine give the same in the plane and in space, and in other axes?
 
-use super::words::Words;
+use super::messages::Words;
 use super::{differ, each};
 use crate::check::mathematics::{ITERATED, flux_scale, largest, own_random};
 use crate::check::random::Random;

@@ -1,10 +1,10 @@
 //! Is the stiffness that a routine leaves the derivative of its stress?
 
 use super::each;
-use super::words::{Words, advice, has_sidecar};
+use super::messages::{Words, advice, has_sidecar};
+use crate::check::loading_path::Step;
 use crate::check::mathematics::{ROUND_OFF, Slope, largest, slope};
 use crate::check::specimen::Specimen;
-use crate::check::walk::Step;
 use crate::check::{Found, Subject, Verdict, skipped};
 use law::Tangent;
 

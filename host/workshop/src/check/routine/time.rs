@@ -1,10 +1,10 @@
 //! Does the time matter to a routine where that is reported, and nowhere else?
 
-use super::words::{Words, advice};
+use super::messages::{Words, advice};
 use super::{bits, differ, each, starts};
+use crate::check::loading_path::{Step, sum};
 use crate::check::mathematics::{ITERATED, flux_scale, increment};
 use crate::check::specimen::{Specimen, is_success};
-use crate::check::walk::{Step, sum};
 use crate::check::{Found, Subject, Verdict, skipped};
 use abi::raw;
 use law::adapter::Adapter;
@@ -83,8 +83,8 @@ pub(super) fn time_as_declared(subject: &Subject) -> Found {
     Ok(format!("{n} increments"))
 }
 
-/// Whether other internal variables at the end of steps give another stress in a next increment like the last one:
-/// what is kept for its own sake, such as the length of substeps, does not count.
+/// Whether other internal variables at the end of steps give another stress in a next increment like the last one.
+/// Variables that do not change the stress, such as the length of substeps, do not count.
 fn carried_on(
     routine: &Specimen,
     steps: &[Step],

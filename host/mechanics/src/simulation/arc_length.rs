@@ -1,0 +1,247 @@
+//! Arc-length control: along the path of equilibrium to the load that could not be reached by load
+//! increments.
+
+use super::steps::{EASY, Progress};
+use super::{Simulation, UnderWay, Warning, Watch, When, go_on, stopped};
+use crate::equilibrium::{Guess, Measure, Newton, Reason, StepFailure, StepSuccess};
+use crate::error::{Error, Place};
+use crate::settings::{Control, Method, Settings};
+
+/// Steps along the path within one increment, at most.
+const MAX_STEPS: usize = 500;
+/// First step, as a fraction of what the points moved in a whole load increment.
+const FIRST: f64 = 0.25;
+/// Maximum number of halvings of a step.
+const HALVINGS: i32 = 12;
+/// A step by the load has leapt where the points move faster than this, relative to the last step.
+const LEAP: f64 = 4.0;
+/// Growth of a step after an easy one.
+const GROWTH: f64 = 1.5;
+
+/// A path that has gone back beyond the start of the phase by more of it than this runs the other way. A snap-back may
+/// pass the start where earlier phases have loaded what gives way.
+const BACK: f64 = 1.0;
+
+/// How a path ends.
+pub(super) enum PathEnd {
+    /// At the load that was sought.
+    Reached,
+    /// No equilibrium was found; with the highest load factor that was reached.
+    Stopped(Box<StepFailure>, f64),
+}
+
+/// A path on its way.
+struct Course {
+    /// Distance of the next step, and that of a whole increment of the load.
+    distance: f64,
+    whole: f64,
+    /// Load factors it has been at.
+    lowest: f64,
+    highest: f64,
+    /// Steps taken.
+    steps: usize,
+}
+
+impl Simulation {
+    /// Follows the path of equilibrium until the load factor reaches `target` from below, in
+    /// increments of 1/`n`.
+    ///
+    /// # Errors
+    /// The observer stopped the run, or the linear groups are not in equilibrium.
+    pub(super) fn follow_path(
+        &mut self,
+        place: &Place,
+        [n, target]: [f64; 2],
+        phase: &mut UnderWay,
+        watch: &mut dyn Watch,
+        done: &mut Progress,
+    ) -> Result<PathEnd, Error> {
+        let start = phase.course.lambda;
+        let Some(mut course) = self.set_out(phase, n) else {
+            let reason = Reason::NothingDeforms { any_more: false };
+            return Ok(PathEnd::Stopped(Box::new(reason.into()), start));
+        };
+        for _ in 0..MAX_STEPS {
+            let from = phase.course.lambda;
+            let mut step = self.advance(phase, course.distance);
+            if let Ok((beyond, lambda)) = &step
+                && *lambda >= target
+            {
+                // Onto the target itself, by the load.
+                done.iterations += beyond.iterations.len();
+                let ratio = (target - from) / (lambda - from);
+                let guess = Guess {
+                    increment: beyond.increment.iter().map(|u| ratio * u).collect(),
+                    contraction: None,
+                    was_motion: false,
+                };
+                let onto = self.attempt(
+                    phase,
+                    (Control::ArcLength, false),
+                    [from, target],
+                    Some(guess),
+                );
+                step = onto.map(|success| (success, target));
+            }
+            match step {
+                Ok((_, lambda)) if lambda < -BACK => {
+                    let reason = Reason::RanBack {
+                        steps: course.steps,
+                        highest: course.highest,
+                        to: lambda,
+                    };
+                    return Ok(PathEnd::Stopped(Box::new(reason.into()), course.highest));
+                }
+                Ok((success, lambda)) => {
+                    let most = self.problem.settings.max_iterations() as f64;
+                    let is_easy = success.iterations.len() as f64 <= EASY * most;
+                    self.take_over(success, lambda, place, phase, watch, done)?;
+                    phase.record.arc_length += 1;
+                    course.steps += 1;
+                    if lambda >= target {
+                        // Not so short that the next increment starts with next to nothing.
+                        phase.course.step = (target - from).clamp(FIRST / n, 1.0 / n);
+                        watch.warning(&Warning::FollowedPath {
+                            place: place.clone(),
+                            start,
+                            between: [course.lowest, course.highest],
+                        });
+                        return Ok(PathEnd::Reached);
+                    }
+                    course.highest = course.highest.max(lambda);
+                    course.lowest = course.lowest.min(lambda);
+                    if is_easy {
+                        course.distance = (GROWTH * course.distance).min(course.whole);
+                    }
+                }
+                Err(failure) if failure.is_stop() => return Err(stopped(place)),
+                Err(failure) => {
+                    go_on(watch.iterations(place, from, &failure.iterations))?;
+                    done.iterations += failure.iterations.len();
+                    phase.record.cut_backs += 1;
+                    course.distance *= 0.5;
+                    go_on(watch.cut_back(place, from, course.distance, &failure.reason))?;
+                    let smallest = FIRST * course.whole * f64::powi(2.0, -HALVINGS);
+                    if failure.defect().is_some() {
+                        return Ok(PathEnd::Stopped(Box::new(failure), course.highest));
+                    }
+                    if course.distance < smallest {
+                        let reason = Reason::Followed {
+                            end: Box::new(failure.reason),
+                            start,
+                            between: [course.lowest, course.highest],
+                        };
+                        let failure = StepFailure { reason, ..failure };
+                        return Ok(PathEnd::Stopped(Box::new(failure), course.highest));
+                    }
+                }
+            }
+        }
+        let reason = Reason::LoadDoesNotRise {
+            steps: MAX_STEPS,
+            between: [course.lowest, course.highest],
+            at: phase.course.lambda,
+        };
+        Ok(PathEnd::Stopped(Box::new(reason.into()), course.highest))
+    }
+
+    /// A step by the load under arc-length control, unless it has leapt over a piece of the path. In a leap the points
+    /// that measure the path move much farther per load than in the last step.
+    pub(super) fn without_leap(
+        &self,
+        attempt: Result<StepSuccess, StepFailure>,
+        phase: &UnderWay,
+        length: f64,
+    ) -> Result<StepSuccess, StepFailure> {
+        let success = attempt?;
+        let followed = self.problem.settings.control == Control::ArcLength;
+        let last = phase.course.history.latest().filter(|_| followed);
+        let Some((last_length, last)) = last else {
+            return Ok(success);
+        };
+        let Some(measure) = Measure::new(&self.groups, &phase.equations.places, last) else {
+            return Ok(success);
+        };
+        let before = (measure.of(last) / last_length).abs();
+        let now = (measure.of(&success.increment) / length).abs();
+        if now <= LEAP * before {
+            return Ok(success);
+        }
+        Err(StepFailure {
+            iterations: success.iterations,
+            ..Reason::Leap(now / before).into()
+        })
+    }
+
+    /// A path from where the phase stands.
+    fn set_out(&self, phase: &UnderWay, n: f64) -> Option<Course> {
+        let (length, increment) = phase.course.history.latest()?;
+        let measure = Measure::new(&self.groups, &phase.equations.places, increment)?;
+        let whole = measure.of(increment) / (n * length).abs();
+        Some(Course {
+            distance: FIRST * whole,
+            whole,
+            lowest: phase.course.lambda,
+            highest: phase.course.lambda,
+            steps: 0,
+        })
+    }
+
+    /// One step along the path, guessed from the last one. Returns its load factor too.
+    fn advance(
+        &mut self,
+        phase: &mut UnderWay,
+        distance: f64,
+    ) -> Result<(StepSuccess, f64), StepFailure> {
+        let (course, equations) = (&phase.course, &mut phase.equations);
+        let last = course.history.latest();
+        let known = last.and_then(|(length, increment)| {
+            Some((
+                Measure::new(&self.groups, &equations.places, increment)?,
+                length,
+                increment,
+            ))
+        });
+        let Some((measure, length, increment)) = known else {
+            return Err(Reason::NothingDeforms { any_more: true }.into());
+        };
+        let ratio = distance / measure.of(increment);
+        let guess = increment.iter().map(|u| ratio * u).collect();
+        // The path turns: a matrix of another state is of no use there.
+        let settings = Settings {
+            method: Method::Newton,
+            ..self.problem.settings
+        };
+        let clock = self.clock(phase.number);
+        let mut newton = Newton::new(
+            (&equations.system, &equations.places),
+            equations.domain.as_ref(),
+            (&mut equations.solver, &mut equations.matrix),
+            &mut self.groups,
+            &settings,
+            &mut phase.record.costs,
+        );
+        newton = newton.stopped_by(&self.stop);
+        newton.step_along(
+            &course.loads,
+            (course.lambda, clock),
+            (&measure, distance),
+            (guess, ratio * length),
+        )
+    }
+
+    /// Hands out a step in equilibrium, within an increment.
+    pub(super) fn hand_out_step(
+        &mut self,
+        place: &Place,
+        phase: &mut UnderWay,
+        iterations: usize,
+        watch: &mut dyn Watch,
+    ) -> Result<(), Error> {
+        let lambda = phase.course.lambda;
+        let looked_at = watch.looks_at(When::Step, &self.groups);
+        self.complete(phase, looked_at.as_ref())
+            .map_err(|reason| self.incomplete(phase, place, lambda, reason))?;
+        go_on(watch.step(place, lambda, iterations, &self.snapshot()))
+    }
+}
