@@ -68,12 +68,31 @@ fn note(test: &str, what: &str) {
     }
 }
 
-/// Summary, in one line, of tests skipped since `cargo test` began. Removes the notes.
+/// Reports in one line what was skipped since `cargo test` began. The names of the tests replace the notes, in
+/// `target/tmp/skipped/tests`, a line each: `.ci/run` repeats these tests once it has installed what they lack.
+///
+/// # Panics
+/// If a test was skipped in a thread that does not have its name, so that it could not be repeated.
 pub fn skipped() -> String {
     let folder = notes().unwrap_or_default();
     let notes = fs::read_to_string(folder.join(starter())).unwrap_or_default();
     let _ = fs::remove_dir_all(&folder);
+    let names = names(&notes);
+    assert!(
+        !names.contains(""),
+        "a test was skipped in a thread without its name:\n{notes}"
+    );
+    let lines: String = names.iter().map(|name| format!("{name}\n")).collect();
+    let _ = fs::create_dir_all(&folder);
+    let _ = fs::write(folder.join("tests"), lines);
     summary(&notes)
+}
+
+/// Names of the tests, as `--exact` takes them.
+fn names(notes: &str) -> BTreeSet<&str> {
+    let tests = notes.lines().filter_map(|line| line.split_once('\t'));
+    let names = tests.filter_map(|(test, _)| test.rsplit_once(' '));
+    names.map(|(_, name)| name).collect()
 }
 
 /// Every test counts once, whatever it lacks.
@@ -210,7 +229,7 @@ pub fn assert_named(test: &str, what: &str) {
 
 #[cfg(test)]
 mod tests {
-    use super::summary;
+    use super::{names, summary};
 
     #[test]
     fn tests_are_counted_once_and_what_they_lack_is_named() {
@@ -218,5 +237,7 @@ mod tests {
         let line = "SKIPPED, in whole or in part: 3 tests, for lack of `cc` (3), `cmake` (1)";
         assert_eq!(summary(notes), line);
         assert_eq!(summary(""), "SKIPPED: no test");
+        let names: Vec<&str> = names(notes).into_iter().collect();
+        assert_eq!(names, ["x", "y"]);
     }
 }

@@ -164,17 +164,17 @@ impl fmt::Display for NoEquilibrium {
         } = self;
         write!(
             f,
-            "{place}: no equilibrium beyond {reached:.4} of {of} increments\n  last attempt: {}",
-            failure.reason
+            "{place}: no equilibrium beyond {reached:.4} of {of} increments"
         )?;
+        if let Some(mechanism) = &failure.mechanism {
+            write!(f, "\n  {mechanism}")?;
+        }
+        write!(f, "\n  last attempt: {}", failure.reason)?;
         if let Some(runaway) = runaway {
             write!(f, "\n  {runaway}")?;
         }
         if let Some(culprit) = &failure.culprit {
             write!(f, "\n  {culprit}")?;
-        }
-        if let Some(mechanism) = &failure.mechanism {
-            write!(f, "\n  {mechanism}")?;
         }
         Ok(())
     }

@@ -19,7 +19,7 @@ use crate::table::{push, push_count, push_text};
 use mechanics::equilibrium::Iteration;
 use mechanics::group::Group;
 use mechanics::simulation::{self, Increment, PhaseRecord, Snapshot};
-use mechanics::{Place, Simulation};
+use mechanics::{NoEquilibrium, Place, Problem, Simulation};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -55,6 +55,8 @@ struct OfPile {
     curve: PileCurve,
     /// Phases that settlements are counted from.
     resets: Vec<String>,
+    /// Phases before the pile is in place.
+    too_early: Vec<String>,
 }
 
 /// How far the results of a run had come at a checkpoint.
@@ -341,7 +343,8 @@ impl Recorder {
         let resets: Vec<String> = resets.map(|phase| phase.name.clone()).collect();
         let summary = Summary::new(about, &wanted, simulation);
         let figures = empty_figures(&wanted);
-        let of_pile = |(pile, stations)| OfPile {
+        let of_pile = |(pile, stations): (Pile, Stations)| OfPile {
+            too_early: pile.phases_too_early(simulation.problem()),
             pile,
             stations,
             curve: PileCurve::default(),
@@ -591,8 +594,11 @@ impl Recorder {
             self.figures.along_pile(place, *of, &state.stations);
             if of_pile.curve.begins(&place.phase) {
                 let resets = of_pile.resets.contains(&place.phase);
+                let is_in_place = !of_pile.too_early.contains(&place.phase);
                 let stiffness = of_pile.pile.stiffness(snapshot.groups);
-                of_pile.curve.phase(&place.phase, resets, stiffness);
+                of_pile
+                    .curve
+                    .phase(&place.phase, [resets, is_in_place], stiffness);
             }
             of_pile.curve.add(&state.loads);
         }
@@ -641,6 +647,11 @@ impl Recorder {
     /// The figures so far.
     pub fn figures(&self) -> &Figures {
         &self.figures
+    }
+
+    /// At which load of its head the pile found no further equilibrium.
+    pub fn plunge(&self, problem: &Problem, none: &NoEquilibrium) -> Option<String> {
+        self.pile.as_ref()?.pile.plunge(problem, none)
     }
 
     /// Resistances of the pile, if there is one.

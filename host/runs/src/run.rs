@@ -323,7 +323,16 @@ fn carry_out(
     for warning in beyond.iter().chain(&unreliable) {
         follower.say(warning);
     }
+    let plunge = match &outcome {
+        Err(mechanics::Error::NoEquilibrium(none)) => {
+            follower.results.plunge(simulation.problem(), none)
+        }
+        _ => None,
+    };
     let outcome = outcome.map_err(|error| explained(case, &simulation, error, &mut follower));
+    if let Some(plunge) = &plunge {
+        follower.observer.note(plunge);
+    }
     follower.tell_results();
     let Follower {
         observer,

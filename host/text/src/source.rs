@@ -281,7 +281,7 @@ pub struct Line<'e> {
 }
 
 impl InputError {
-    /// The line that it is about, for those who do not show it as [`crate::error_display`] does.
+    /// The line that it is about, for those who do not show it as [`crate::shown`] does.
     pub fn line(&self) -> Line<'_> {
         let start = self.span.start.min(self.text.len());
         let before = &self.text[..start];

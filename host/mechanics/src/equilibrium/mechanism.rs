@@ -26,7 +26,7 @@ impl fmt::Display for Mechanism {
         let [points, of] = self.points;
         write!(
             f,
-            "what gives way: {}, {}, and so do {points} of {of} points of the group in all",
+            "what gives way: {}, {}; {points} of {of} points of the group do",
             self.how, self.at
         )?;
         if self.is_bare {

@@ -19,6 +19,14 @@ const SAME_THICKNESS: f64 = 0.01;
 /// turn is a straight side.
 const CORNER: f64 = 170.0 / 180.0 * std::f64::consts::PI;
 
+/// Heaviest material, and range of ground, kN/m³: steel weighs 77, lead 111; peat about 10, ground rich in ore 30.
+const HEAVY: f64 = 90.0;
+const GROUND: [f64; 2] = [5.0, 30.0];
+/// Extent beyond any site, m.
+const VAST: f64 = 1e4;
+/// Tolerances above this share of the forces in play are no accuracy.
+const LOOSE: f64 = 0.1;
+
 /// Warnings about a model before it runs. `swaps`: the groups that take another law, by
 /// phase.
 pub(crate) fn warnings(
@@ -28,7 +36,9 @@ pub(crate) fn warnings(
 ) -> Vec<String> {
     let mesh = &problem.mesh;
     let mut warnings = far(problem);
-    warnings.extend(light(problem));
+    warnings.extend(vast(problem));
+    warnings.extend(loose(problem));
+    warnings.extend(weights(problem));
     warnings.extend(lost(problem));
     warnings.extend(super::uncovered_loads::warnings(problem));
     warnings.extend(beside_undrained(problem));
@@ -142,24 +152,103 @@ pub(crate) fn implausible_stiffness(group: &Group) -> Option<String> {
     ))
 }
 
-/// Wet ground that is lighter than dry ground or than water.
-fn light(problem: &Problem) -> Vec<String> {
+/// A mesh that is larger than any site.
+fn vast(problem: &Problem) -> Option<String> {
+    let nodes = &problem.mesh.nodes;
+    let extent = |c: usize| {
+        let ends = nodes
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], node| {
+                [low.min(node[c]), high.max(node[c])]
+            });
+        ends[1] - ends[0]
+    };
+    let [width, height] = [0, 1].map(extent);
+    (width.max(height) > VAST).then(|| {
+        format!(
+            "the mesh is {width} m wide and {height} m high: lengths are in m. `scale = 0.001` in [mesh] reads a file in \
+             millimetres"
+        )
+    })
+}
+
+/// A tolerance that leaves a notable part of the loads out of balance.
+fn loose(problem: &Problem) -> Option<String> {
+    let tolerance = problem.settings.force_tolerance;
+    (tolerance > LOOSE).then(|| {
+        format!(
+            "`force_tolerance` = {tolerance} in [solver]: up to {:.0} % of the forces in play may be out of balance",
+            100.0 * tolerance
+        )
+    })
+}
+
+/// Unit weights that no ground or material has, and saturated ground that is lighter than dry ground or water.
+fn weights(problem: &Problem) -> Vec<String> {
     let water = problem.water.as_ref().map(|water| water.unit_weight);
-    let light = problem.groups.iter().filter_map(|group| {
-        let wet = group.saturated_unit_weight?;
-        let than = if wet < group.unit_weight {
-            format!("`unit_weight` {}", group.unit_weight)
-        } else {
-            let water = water.filter(|&water| group.pore_water && wet < water)?;
-            format!("{water} of water")
-        };
-        Some(format!(
-            "group `{}`: `saturated_unit_weight` {wet} is less than {than}: it is the weight of ground and \
-             water together, not that under buoyancy",
-            group.name
-        ))
-    });
-    light.collect()
+    let mut warnings = Vec::new();
+    for group in &problem.groups {
+        let is_ground = group.initial_stress.is_some();
+        let of_group = [
+            ("unit_weight", Some(group.unit_weight)),
+            ("saturated_unit_weight", group.saturated_unit_weight),
+        ];
+        let strange = of_group.into_iter().filter_map(|(key, value)| {
+            let why = strange_weight(value?, is_ground)?;
+            Some(format!("group `{}`: `{key}` is {why}", group.name))
+        });
+        let strange: Vec<String> = strange.collect();
+        let wet = group.saturated_unit_weight;
+        let lighter = wet.filter(|_| strange.is_empty()).and_then(|wet| {
+            let than = if wet < group.unit_weight {
+                format!("`unit_weight` {}", group.unit_weight)
+            } else {
+                let water = water.filter(|&water| group.pore_water && wet < water)?;
+                format!("{water} of water")
+            };
+            Some(format!(
+                "group `{}`: `saturated_unit_weight` {wet} is less than {than}: it is the weight of ground and \
+                 water together, not that under buoyancy",
+                group.name
+            ))
+        });
+        warnings.extend(strange.into_iter().chain(lighter));
+    }
+    for phase in &problem.phases {
+        for &(group, value) in &phase.unit_weight {
+            if let Some(why) = strange_weight(value, false) {
+                let (phase, group) = (&phase.name, &problem.groups[group].name);
+                warnings.push(format!(
+                    "phase `{phase}`: `unit_weight` of group `{group}` is {why}"
+                ));
+            }
+        }
+    }
+    warnings
+}
+
+/// The value of a unit weight, with what speaks against it, if anything does.
+fn strange_weight(value: f64, is_ground: bool) -> Option<String> {
+    const WATER: f64 = 9.81;
+    let [low, high] = GROUND;
+    let is_heavy = value > HEAVY || is_ground && value > high;
+    let is_light = is_ground && value > 0.0 && value < low;
+    let usual = if is_ground {
+        format!("ground has {low} to {high}")
+    } else {
+        "concrete has 24, steel 77".to_owned()
+    };
+    let unit = if is_heavy && value >= 100.0 * low {
+        format!(
+            ": {value} kg/m³ would be {:.1} kN/m³",
+            value * WATER / 1000.0
+        )
+    } else if is_light && value < 0.001 * high {
+        format!(": {value} MN/m³ would be {} kN/m³", 1000.0 * value)
+    } else {
+        String::new()
+    };
+    (is_heavy || is_light).then(|| format!("{value} kN/m³, {usual}{unit}"))
 }
 
 /// Warnings of input for ground that has no effect.

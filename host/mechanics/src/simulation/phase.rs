@@ -34,6 +34,9 @@ pub(super) struct PhaseEquations {
     counted: [u64; 2],
 }
 
+/// Smallest share of the forces in play that is reported where a phase starts out of balance; `summary.json` has all.
+const NOTABLE: f64 = 1e-3;
+
 impl PhaseEquations {
     fn n(&self) -> usize {
         self.n_unknowns
@@ -83,8 +86,7 @@ impl Simulation {
         if number == 0 && has_weight && weight > 0.0 {
             watch.at_rest(&name, imbalance * self.largest_force / weight);
         }
-        // What an earlier phase left within its tolerance is nothing new.
-        if imbalance > f64::max(1e-6, self.settings().force_tolerance) {
+        if imbalance > f64::max(NOTABLE, self.settings().force_tolerance) {
             watch.warning(&Warning::OutOfBalance(name.clone(), imbalance));
         }
         let record = PhaseRecord {

@@ -302,7 +302,8 @@ fn motions(f: &mut fmt::Formatter<'_>, phase: &str, relaxed: usize, viscous: usi
 fn out_of_balance(f: &mut fmt::Formatter<'_>, phase: &str, share: f64) -> fmt::Result {
     write!(
         f,
-        "phase `{phase}` starts out of balance: {} % of the forces in play, carried to equilibrium in its course",
+        "phase `{phase}` starts out of balance: its initial stresses and loads differ by {} % of the forces in play, and the ground \
+         moves until they balance",
         if share < 1e-4 {
             format!("{:.1e}", 100.0 * share)
         } else {

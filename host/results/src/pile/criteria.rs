@@ -18,6 +18,8 @@ pub(crate) struct OfPhase {
     phase: String,
     /// Settlements are counted from its start.
     resets: bool,
+    /// The pile is in place: its interfaces are active and its law is that of the pile.
+    is_in_place: bool,
     /// E A of the head's section, kN.
     stiffness: Option<f64>,
     weight: f64,
@@ -68,10 +70,16 @@ impl Curve {
         self.0.last().is_none_or(|last| last.phase != phase)
     }
 
-    pub(crate) fn phase(&mut self, phase: &str, resets: bool, stiffness: Option<f64>) {
+    pub(crate) fn phase(
+        &mut self,
+        phase: &str,
+        [resets, is_in_place]: [bool; 2],
+        stiffness: Option<f64>,
+    ) {
         self.0.push(OfPhase {
             phase: phase.to_owned(),
             resets,
+            is_in_place,
             stiffness,
             ..OfPhase::default()
         });
@@ -102,8 +110,12 @@ impl Curve {
             }
         };
         let moves = |number: &usize| {
-            let points = &self.0[*number].points;
-            points.last().is_some_and(|end| end[0] > start(*number))
+            let OfPhase {
+                points,
+                is_in_place,
+                ..
+            } = &self.0[*number];
+            *is_in_place && points.last().is_some_and(|end| end[0] > start(*number))
         };
         let number = (0..self.0.len()).rev().find(moves)?;
         let first = (0..=number).rev().find(|&n| self.0[n].resets).unwrap_or(0);
@@ -141,7 +153,7 @@ impl Curve {
             points,
         }) = self.last_push()
         else {
-            let why = "the head moves down in no phase".to_owned();
+            let why = "the head moves down in no phase with the pile in place".to_owned();
             return Resistances {
                 phase: None,
                 unit,

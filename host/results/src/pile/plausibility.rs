@@ -2,8 +2,8 @@
 
 use super::geometry::{SAME, sides};
 use super::{Base, Pile};
-use mechanics::Simulation;
-use mechanics::problem::{Analysis, Axis, Formulation};
+use mechanics::problem::{Analysis, Axis, Formulation, Phase};
+use mechanics::{NoEquilibrium, Problem, Simulation};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 impl Pile {
@@ -13,7 +13,184 @@ impl Pile {
         said.extend(self.of_shaft(simulation));
         said.extend(self.beside_shaft(simulation));
         said.extend(self.half(simulation));
+        said.extend(self.narrow(simulation));
+        said.extend(self.loaded_too_early(simulation.problem()));
+        said.extend(self.only_pulled(simulation.problem()));
         said
+    }
+
+    /// A diameter that is less than that of the shaft: a radius, most likely.
+    fn narrow(&self, simulation: &Simulation) -> Option<String> {
+        let problem = simulation.problem();
+        let diameter = self.parts.diameter?;
+        let facets = self.geometry.shaft.iter().flat_map(|facet| facet.nodes);
+        let radius = facets
+            .map(|node| problem.mesh.nodes[node][0])
+            .fold(0.0, f64::max);
+        (problem.analysis == Analysis::Axisymmetric && diameter < 0.9 * 2.0 * radius).then(|| {
+            format!(
+                "[pile]: `diameter` is {diameter} m, the shaft in the mesh has {}: is it the radius?",
+                2.0 * radius
+            )
+        })
+    }
+
+    /// Why the pile is not in place in a phase: an interface of its shaft or base is inactive, or the pile still has the
+    /// law of the ground. `None` if it is in place.
+    pub(crate) fn not_in_place(&self, problem: &Problem, phase: usize) -> Option<String> {
+        let phases = &problem.phases[..=phase];
+        let is_active = |group: usize| {
+            let start = problem.groups[group].is_active;
+            phases.iter().fold(start, |active, phase| {
+                (active || phase.activate.contains(&group)) && !phase.deactivate.contains(&group)
+            })
+        };
+        let law = |group: usize| {
+            let swaps = phases.iter().flat_map(|phase| &phase.materials);
+            let last = swaps.filter(|(of, _)| *of == group).last();
+            &last
+                .map_or(&problem.groups[group].material, |(_, law)| law)
+                .name
+        };
+        let base = match self.parts.base {
+            Base::Group(group) => Some(group),
+            Base::Line(_) => None,
+        };
+        let mut joints = self.parts.shaft.iter().copied().chain(base);
+        if let Some(absent) = joints.find(|&group| !is_active(group)) {
+            return Some(format!(
+                "interface `{}` is not active",
+                problem.groups[absent].name
+            ));
+        }
+        let own = self.parts.groups.iter().filter(|&&group| is_active(group));
+        let ground = problem.groups.iter().enumerate().filter(|(number, group)| {
+            group.initial_stress.is_some()
+                && is_active(*number)
+                && !self.parts.groups.contains(number)
+        });
+        let ground: Vec<(usize, &String)> = ground.map(|(n, group)| (n, &group.name)).collect();
+        own.copied().find_map(|pile| {
+            let (_, name) = ground.iter().find(|(group, _)| law(*group) == law(pile))?;
+            Some(format!(
+                "group `{}` has law `{}`, that of the ground (group `{name}`)",
+                problem.groups[pile].name,
+                law(pile)
+            ))
+        })
+    }
+
+    /// Names of the phases in which the pile is not in place.
+    pub(crate) fn phases_too_early(&self, problem: &Problem) -> Vec<String> {
+        let phases = problem.phases.iter().enumerate();
+        let early = phases.filter(|(number, _)| self.not_in_place(problem, *number).is_some());
+        early.map(|(_, phase)| phase.name.clone()).collect()
+    }
+
+    /// Vertical loads and displacements that a phase gives the head: greatest of either sign, upward positive.
+    fn head_moves(&self, phase: &Phase) -> [f64; 2] {
+        let head = &self.parts.head;
+        let forces = phase.force.iter().filter(|input| input.line == *head);
+        let displacements = phase
+            .displacement
+            .iter()
+            .filter(|input| input.line == *head);
+        let pressures = phase.pressure.iter().filter(|input| input.line == *head);
+        let upward = forces.filter_map(|input| input.y);
+        let upward = upward.chain(displacements.filter_map(|input| input.y));
+        let upward =
+            upward.chain(pressures.flat_map(|input| input.value.values().map(|value| -value)));
+        upward.fold([0.0, 0.0], |[down, up], value| {
+            [value.min(down), value.max(up)]
+        })
+    }
+
+    /// A phase that loads the head before the pile is in place.
+    fn loaded_too_early(&self, problem: &Problem) -> Option<String> {
+        let mut phases = problem.phases.iter().enumerate();
+        phases.find_map(|(number, phase)| {
+            let why = self.not_in_place(problem, number)?;
+            (self.head_moves(phase) != [0.0, 0.0]).then(|| {
+                format!(
+                    "[pile]: phase `{}` loads the head before the pile is in place: {why}. No resistance is reported from \
+                     this phase",
+                    phase.name
+                )
+            })
+        })
+    }
+
+    /// Phases pull the head up, and none pushes it down.
+    fn only_pulled(&self, problem: &Problem) -> Option<String> {
+        let moves = problem
+            .phases
+            .iter()
+            .map(|phase| (phase, self.head_moves(phase)));
+        let moves: Vec<_> = moves.collect();
+        if moves.iter().any(|(_, [down, _])| *down < 0.0) {
+            return None;
+        }
+        let (phase, [_, up]) = moves.iter().find(|(_, [_, up])| *up > 0.0)?;
+        Some(format!(
+            "[pile]: phase `{}` pulls the head upward ({up}), and no phase pushes it down: forces and displacements that push a \
+             pile down are negative in z",
+            phase.name
+        ))
+    }
+
+    /// At which load of the head a phase of forces found no further equilibrium, in one sentence. `None` unless the
+    /// phase changes a force on the head along a straight ramp.
+    pub(crate) fn plunge(&self, problem: &Problem, none: &NoEquilibrium) -> Option<String> {
+        let number = problem
+            .phases
+            .iter()
+            .position(|phase| phase.name == none.place.phase)?;
+        let on_head = |phase: &Phase| {
+            let mut own = phase
+                .force
+                .iter()
+                .filter(|force| force.line == self.parts.head);
+            own.find_map(|force| force.y)
+        };
+        let phase = &problem.phases[number];
+        let end = on_head(phase).filter(|_| phase.course.is_empty())?;
+        let start = problem.phases[..number]
+            .iter()
+            .rev()
+            .find_map(on_head)
+            .unwrap_or(0.0);
+        let carried = start + none.reached / none.of as f64 * (end - start);
+        let unit = self.geometry.analysis.force_unit();
+        let way = if end < start {
+            "plunges"
+        } else {
+            "is pulled out or unloads"
+        };
+        let part = none.failure.mechanism.as_ref().map(|mechanism| {
+            let is_of = |number: usize| problem.groups[number].name == mechanism.at.group;
+            let part = if self.parts.shaft.iter().any(|&group| is_of(group)) {
+                "at the shaft "
+            } else if matches!(self.parts.base, Base::Group(group) if is_of(group)) {
+                "at the base "
+            } else {
+                ""
+            };
+            format!(": {part}{}", mechanism.how)
+        });
+        let unlike = if (carried - start).abs() < 0.01 * (end - start).abs() {
+            format!(
+                "The force given is {:.0} times that: forces are in {unit}, not in N",
+                (end / carried).abs()
+            )
+        } else {
+            "To follow it further, push the head by `displacement` instead of `force`".to_owned()
+        };
+        Some(format!(
+            "pile: {way} at a head load of {:.1} of {:.1} {unit}{}. {unlike}",
+            -carried,
+            -end,
+            part.unwrap_or_default()
+        ))
     }
 
     /// Corners and middles of the sides of its elements, each once.
