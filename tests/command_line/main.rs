@@ -26,6 +26,7 @@ mod run_table;
 mod running;
 mod settings;
 mod shear_zone;
+mod situations;
 mod slurm;
 mod stopping;
 mod streams;

@@ -121,22 +121,22 @@ fn hint(error: &mechanics::Error) -> Option<String> {
 /// Untried remedies if no equilibrium was found, and the files written by the run.
 fn after_no_equilibrium(none: &NoEquilibrium) -> String {
     let viscous = none.control.relaxes().then_some(if none.viscous {
-        "`control = \"viscous\"` in [solver], by whole increments, may lead on where short steps do not: what flows on its way \
-         stays, so hold the results against those of other increments"
+        "`control = \"viscous\"` in [solver] takes whole increments and may get further: compare its results with those of other \
+         increments"
     } else {
-        "`control = \"viscous\"` in [solver], which follows the motion to the next equilibrium as a path, may lead on"
+        "`control = \"viscous\"` in [solver] follows the motion to the next equilibrium and may get further"
     });
     let ways = match &none.failure.reason {
         reason if none.control == Control::ArcLength && may_have_another_way(reason) => vec![
-            "`control = \"auto\"` in [solver], which turns to viscous relaxation and control where the load leads no further, and \
+            "`control = \"auto\"` in [solver], which turns to viscous relaxation and viscous control where steps of the load fail, and \
              `control = \"viscous\"` were not tried",
         ],
         reason if !none.may_move && may_have_another_way(reason) => vec![
-            "`method = \"auto\"` with `relaxation = true` in [solver], with which relaxation and viscous control lead on where iterations \
-             stand still, was not tried",
+            "`method = \"auto\"` with `relaxation = true` in [solver], which allows viscous relaxation and viscous control where \
+             iterations stall, was not tried",
         ],
         Reason::Unmet(Iterations::Newton(_, Some(_)), _) => vec![
-            viscous.unwrap_or("other increments may lead on"),
+            viscous.unwrap_or("other increments may get further"),
             "`convergence = \"force\"` with a force_tolerance of 1e-3 asks for loads in balance alone, where \
              displacements drift",
         ],
@@ -144,8 +144,8 @@ fn after_no_equilibrium(none: &NoEquilibrium) -> String {
         _ => Vec::new(),
     };
     let bond = none.failure.mechanism.as_ref().and_then(remedy);
-    let written = "results up to the last whole increment in equilibrium are written, the last equilibrium itself is \
-                   `stopped_at` in summary.json; log.jsonl lists the iterations";
+    let written = "all whole increments in equilibrium are written; the last equilibrium is `stopped_at` in summary.json, and \
+                   log.jsonl lists the iterations";
     bond.into_iter()
         .chain(ways)
         .chain([written])

@@ -4,15 +4,15 @@ use super::Group;
 use law::{End, Operator, Start, Strided, current_call};
 
 impl Group {
-    /// The law's elastic operator at a point of solids in the committed state, row by row. `None`
-    /// if the law has no operator there.
+    /// The law's elastic operator at a point in the committed state, row by row. `None` if the law has no operator there,
+    /// or has other components than the element.
     pub fn elastic_operator(&self, point: usize) -> Option<Vec<f64>> {
         let n = self.kinematics.n_components();
         let pieces = self.pieces(usize::MAX).into_iter();
         let (_, law) = pieces
             .into_iter()
             .find(|(points, _)| points.contains(&point))?;
-        if n != 4 || law.n_components() != n {
+        if law.n_components() != n {
             return None;
         }
         let n_states = law.n_states();

@@ -588,8 +588,8 @@ impl fmt::Display for Cause {
                 pore,
             } => write!(
                 f,
-                "the vertical effective stress at rest is tension: at ({x:.4}, {y:.4}) {above:.4} kPa stand \
-                 above, and the pressure in the pores is {pore:.4} kPa"
+                "the vertical effective stress at rest is tensile at ({x:.4}, {y:.4}): the ground above and the surcharge weigh \
+                 {above:.4} kPa, the pore pressure is {pore:.4} kPa"
             ),
             Self::UndrainedWithoutWater(group) => write!(
                 f,
@@ -690,8 +690,7 @@ impl Cause {
                 "K_0 lies between active and passive pressure: at the surface cohesion, or another K_0"
             }
             Self::LiftedAtRest { .. } => {
-                "`unit_weight` and `saturated_unit_weight` are those of ground and water together, not under \
-                 buoyancy"
+                "`unit_weight` and `saturated_unit_weight` are those of ground and water together, not under buoyancy, in kN/m³"
             }
             Self::LostForce(line, axis) => {
                 return Some(format!(

@@ -203,7 +203,7 @@ impl Validity {
         }
         if let Some([largest, side]) = self.moved {
             bodies.push(format!(
-                "a node moves by {largest:.4e} m, the model is {side:.4} m long"
+                "a node moves by {largest:.4} m, the model is {side:.4} m long"
             ));
         }
         let mut warnings = self.stiffness.clone();
@@ -223,7 +223,7 @@ impl Validity {
         if let Some((_, [jump, length], group)) = &self.slipped {
             warnings.push(format!(
                 "beyond the theory of small displacements: the two sides of group `{group}` move \
-                 against each other by {jump:.4e} m, it is {length:.4} m long"
+                 against each other by {jump:.4} m, it is {length:.4} m long"
             ));
         }
         warnings

@@ -6,6 +6,11 @@ use mechanics::problem::{Analysis, Axis, Formulation, Phase};
 use mechanics::{NoEquilibrium, Problem, Simulation};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
+/// An interface is soft, or too stiff for the digits of numbers, beyond these thicknesses of ground that yield as much
+/// as it does, in diameters.
+const SOFT: f64 = 1.0;
+const STIFF: f64 = 1e-8;
+
 impl Pile {
     /// Warnings about the pile before it is loaded.
     pub fn oddities(&self, simulation: &Simulation) -> Vec<String> {
@@ -14,6 +19,7 @@ impl Pile {
         said.extend(self.beside_shaft(simulation));
         said.extend(self.half(simulation));
         said.extend(self.narrow(simulation));
+        said.extend(self.soft(simulation));
         said.extend(self.loaded_too_early(simulation.problem()));
         said.extend(self.only_pulled(simulation.problem()));
         said
@@ -33,6 +39,64 @@ impl Pile {
                 2.0 * radius
             )
         })
+    }
+
+    /// Interfaces that yield as much as a thick layer of the ground, or are so stiff that their slip is lost in rounding.
+    fn soft(&self, simulation: &Simulation) -> Vec<String> {
+        let groups = simulation.groups();
+        let operator = |number: usize| groups[number].elastic_operator(0);
+        let base = match self.parts.base {
+            Base::Group(group) => Some(group),
+            Base::Line(_) => None,
+        };
+        let joints = self.parts.shaft.iter().copied().chain(base);
+        let diameter = self.diameter();
+        let mut said = Vec::new();
+        for joint in joints.filter(|&joint| groups[joint].formulation == Formulation::ZeroThickness)
+        {
+            let nodes_of = |number: usize| {
+                let kinematics = &groups[number].kinematics;
+                (0..kinematics.n_elements()).flat_map(|element| kinematics.nodes(element))
+            };
+            let own: BTreeSet<usize> = nodes_of(joint).copied().collect();
+            let is_ground = |number: &usize| {
+                groups[*number].formulation == Formulation::Solid
+                    && !self.parts.groups.contains(number)
+                    && nodes_of(*number).any(|node| own.contains(node))
+            };
+            let ground = (0..groups.len()).filter(is_ground).filter_map(operator);
+            // Constrained and shear modulus of the stiffest ground there.
+            let [constrained, shear] = ground.fold([0.0_f64, 0.0_f64], |[m, g], d| {
+                [m.max(d[5]), g.max(0.5 * (d[5] - d[4]))]
+            });
+            let Some(stiffness) = operator(joint).filter(|_| constrained > 0.0) else {
+                continue;
+            };
+            for (name, modulus, stiffness) in [
+                ("normal", constrained, stiffness[0]),
+                ("shear", shear, stiffness[3]),
+            ] {
+                let layer = modulus / stiffness;
+                let (law, group) = (&groups[joint].law.name, &groups[joint].name);
+                let of = format!(
+                    "[pile]: interface `{group}`, law `{law}`: its elastic {name} stiffness, {stiffness:.1e} kPa/m, "
+                );
+                if layer > SOFT * diameter {
+                    said.push(format!(
+                        "{of}is that of {layer:.2} m of the ground beside it, and settlements depend on it: {} kPa/m are as stiff as \
+                         a layer of a twentieth of the diameter",
+                        rounded(20.0 * modulus / diameter)
+                    ));
+                } else if layer < STIFF * diameter {
+                    said.push(format!(
+                        "{of}is that of {layer:.0e} m of the ground beside it, and its slip is lost in rounding: {} kPa/m are as stiff \
+                         as a layer of a thousandth of the diameter",
+                        rounded(1000.0 * modulus / diameter)
+                    ));
+                }
+            }
+        }
+        said
     }
 
     /// Why the pile is not in place in a phase: an interface of its shaft or base is inactive, or the pile still has the
@@ -132,8 +196,8 @@ impl Pile {
         }
         let (phase, [_, up]) = moves.iter().find(|(_, [_, up])| *up > 0.0)?;
         Some(format!(
-            "[pile]: phase `{}` pulls the head upward ({up}), and no phase pushes it down: forces and displacements that push a \
-             pile down are negative in z",
+            "[pile]: phase `{}` pulls the head upward ({up}), and no phase pushes it down: an uplift test. Forces and \
+             displacements that push a pile down are negative in z",
             phase.name
         ))
     }
@@ -161,10 +225,12 @@ impl Pile {
             .unwrap_or(0.0);
         let carried = start + none.reached / none.of as f64 * (end - start);
         let unit = self.geometry.analysis.force_unit();
-        let way = if end < start {
-            "plunges"
+        let (way, of) = if end < start {
+            ("plunges at a head load", [-carried, -end])
+        } else if end > 0.0 {
+            ("is pulled out at an uplift", [carried, end])
         } else {
-            "is pulled out or unloads"
+            ("has no equilibrium below a head load", [-carried, -end])
         };
         let part = none.failure.mechanism.as_ref().map(|mechanism| {
             let is_of = |number: usize| problem.groups[number].name == mechanism.at.group;
@@ -177,18 +243,19 @@ impl Pile {
             };
             format!(": {part}{}", mechanism.how)
         });
-        let unlike = if (carried - start).abs() < 0.01 * (end - start).abs() {
+        let unlike = if (carried - start).abs() < 0.05 * (end - start).abs() {
             format!(
-                "The force given is {:.0} times that: forces are in {unit}, not in N",
+                "The force given is {:.0} times that: forces are in {unit}, is it in N?",
                 (end / carried).abs()
             )
         } else {
             "To follow it further, push the head by `displacement` instead of `force`".to_owned()
         };
         Some(format!(
-            "pile: {way} at a head load of {:.1} of {:.1} {unit}{}. {unlike}",
-            -carried,
-            -end,
+            "pile: {way} of {:.1} {unit}, where phase `{}` asks for {:.1}{}. {unlike}",
+            of[0],
+            phase.name,
+            of[1],
             part.unwrap_or_default()
         ))
     }
@@ -334,6 +401,12 @@ impl Pile {
             )
         })
     }
+}
+
+/// With one digit.
+fn rounded(value: f64) -> String {
+    let unit = 10_f64.powf(value.log10().floor());
+    format!("{:.0e}", (value / unit).round() * unit)
 }
 
 fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
