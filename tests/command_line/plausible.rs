@@ -316,7 +316,7 @@ fn warns_of_results_beyond_small_strains() {
     );
     warns(
         &[(PUSH, "displacement = [{ line = \"top\", x = 0.5 }]")],
-        &["a node moves by 5.0000e-1 m, the model is 2.0000 m long"],
+        &["a node moves by 0.5000 m, the model is 2.0000 m long"],
     );
     let opened = [
         JOINT,

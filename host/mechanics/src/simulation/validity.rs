@@ -214,12 +214,8 @@ impl Validity {
                  `integration = \"b_bar\"` or `\"full\"` resists it"
             ));
         }
-        if !bodies.is_empty() {
-            warnings.push(format!(
-                "beyond the theory of small strains: {}",
-                bodies.join("; ")
-            ));
-        }
+        let bodies = bodies.into_iter();
+        warnings.extend(bodies.map(|why| format!("beyond the theory of small strains: {why}")));
         if let Some((_, [jump, length], group)) = &self.slipped {
             warnings.push(format!(
                 "beyond the theory of small displacements: the two sides of group `{group}` move \

@@ -83,13 +83,13 @@ impl Pile {
                 );
                 if layer > SOFT * diameter {
                     said.push(format!(
-                        "{of}is that of {layer:.2} m of the ground beside it, and settlements depend on it: {} kPa/m are as stiff as \
+                        "{of}is that of {layer:.2} m of the ground beside it. Settlements depend on it: {} kPa/m are as stiff as \
                          a layer of a twentieth of the diameter",
                         rounded(20.0 * modulus / diameter)
                     ));
                 } else if layer < STIFF * diameter {
                     said.push(format!(
-                        "{of}is that of {layer:.0e} m of the ground beside it, and its slip is lost in rounding: {} kPa/m are as stiff \
+                        "{of}is that of {layer:.0e} m of the ground beside it. Its slip is lost in rounding: {} kPa/m are as stiff \
                          as a layer of a thousandth of the diameter",
                         rounded(1000.0 * modulus / diameter)
                     ));
@@ -394,8 +394,8 @@ impl Pile {
         let width = self.geometry.width;
         self.sides(simulation).iter().any(upright).then(|| {
             format!(
-                "[pile]: the pile stands on a line that is held in x, as one half of a pile on its plane of symmetry: \
-                 its loads are those of the half, and its criteria take the half's width of {width} m, unless \
+                "[pile]: the pile stands on a line that is held in x, as one half of a pile on its plane of symmetry. \
+                 Its loads are those of the half, and its criteria take the half's width of {width} m, unless \
                  `diameter` names another, such as {}",
                 2.0 * width
             )
