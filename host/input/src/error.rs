@@ -372,12 +372,12 @@ mod tests {
             ..none(Control::Auto, in_vain(Motion::Viscous))
         });
         assert!(short.starts_with(VISCOUSLY), "{short}");
-        assert!(short.contains("by whole increments"), "{short}");
-        assert!(!relaxed.contains("by whole increments"), "{relaxed}");
+        assert!(short.contains("takes whole increments"), "{short}");
+        assert!(!relaxed.contains("takes whole increments"), "{relaxed}");
         let viscous = help(Control::Viscous, in_vain(Motion::Viscous));
         assert!(!viscous.contains(VISCOUSLY), "{viscous}");
         assert!(viscous.starts_with("other increments"), "{viscous}");
-        let written = "results up to the last whole increment";
+        let written = "all whole increments in equilibrium are written";
         assert!(help(Control::Viscous, LIMIT).starts_with(written));
         assert!(help(Control::Auto, Reason::NoState).starts_with(written));
     }
