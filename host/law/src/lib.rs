@@ -10,7 +10,7 @@ mod construct;
 #[cfg(unix)]
 pub mod current_call;
 #[cfg(not(unix))]
-#[path = "current_call/none.rs"]
+#[path = "current_call/unsupported.rs"]
 pub mod current_call;
 mod description;
 mod digest;

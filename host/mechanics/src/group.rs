@@ -5,23 +5,23 @@
 
 mod breaks;
 mod broken_bonds;
-mod correction;
 mod depth_profile;
-mod differences;
+mod difference_tangents;
+mod elastic_operator;
 mod failure_mode;
 mod integrate;
 mod law_start;
-mod layer;
-mod operator;
 mod point_tangent;
 mod probed_elements;
 mod saved_state;
 mod state;
 mod tangent_check;
+mod thin_layer;
 mod tied_faces;
+mod traction_projection;
 mod water;
 
-pub use differences::{Origin, Reason as MadeBy};
+pub use difference_tangents::{Origin, Reason as MadeBy};
 pub use failure_mode::FailureMode;
 pub use point_tangent::Fault;
 pub use probed_elements::Excerpted;
@@ -39,10 +39,10 @@ use depth_profile::Varying;
 use law::Law;
 use law::{BatchFailure, BatchSuccess, End, Moment, Operator, Site, Start, Strided, current_call};
 pub use law_start::LawStart;
-use layer::Layer;
 pub use saved_state::Aside;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
+use thin_layer::Layer;
 use water::Pores;
 
 /// Components of the strain (jump) that a linear law is tried with, and what its stress may be off

@@ -16,7 +16,7 @@
 #[cfg(target_os = "linux")]
 mod child;
 #[cfg(not(target_os = "linux"))]
-#[path = "supervision/none.rs"]
+#[path = "supervision/unsupported.rs"]
 mod child;
 #[cfg(target_os = "linux")]
 mod parent;

@@ -5,7 +5,7 @@
 //! has to equal it. At a kink, or in noise, they differ, and the tangent is not judged.
 
 use super::Group;
-use super::differences::{Origin, Reason};
+use super::difference_tangents::{Origin, Reason};
 use law::{End, Operator, Strided};
 
 /// Sizes of the differences, relative to the increment of the gradients.
