@@ -27,7 +27,10 @@ fn inputs(folder: &Path, found: &mut Vec<PathBuf>) {
         let path = entry.unwrap().path();
         if path.is_dir() {
             inputs(&path, found);
-        } else if path.extension().is_some_and(|suffix| suffix == "toml") {
+        } else if path.extension().is_some_and(|suffix| suffix == "toml")
+            // The sidecar of a library: `pilum check` reads it.
+            && !path.to_string_lossy().ends_with(".law.toml")
+        {
             found.push(path);
         }
     }

@@ -217,7 +217,7 @@ fn run(text: &str, probe: &str) -> (Vec<String>, Vec<f64>) {
     let others = [
         "no group takes",
         "probe `",
-        "is active in no phase",
+        "is never active: no phase has it in `activate`",
         "starts out of balance",
     ];
     let warnings = warnings.filter(|said| !others.iter().any(|other| said.contains(other)));

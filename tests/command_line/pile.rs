@@ -530,7 +530,7 @@ fn what_is_no_pile_is_told_where_it_is_written() {
         ),
         (
             ("head = \"head\"\n", "head = \"far\"\n"),
-            "`far` has no side of the pile's elements",
+            "`far` has no edge of the pile's elements: name the line along the top of the pile",
         ),
         (
             ("head = \"head\"\n", "head = \"head\"\ndiameter = -1.0\n"),

@@ -333,7 +333,7 @@ fn warns_of_results_beyond_small_strains() {
     warns(
         &opened,
         &[
-            "the two sides of group `layer` move against each other by 9.",
+            "the two sides of group `layer` move against each other by 0.9",
             "2.0000 m long",
         ],
     );
@@ -505,7 +505,7 @@ fn a_phase_without_a_time_is_told_of_where_a_parameter_is_one() {
         for (said, phase) in lines.iter().zip(["weight", "push"]) {
             let place = format!("case.toml:{}:", line(&text, phase));
             let words = format!(
-                "phase `{phase}` has no `time`, and law `soil` (`relaxation_time` is 2 s) depends on time: the phase takes 1"
+                "phase `{phase}` has no `time`, and law `soil` (`relaxation_time` is 2 s) depends on time: the phase takes 1 unit of time"
             );
             assert!(said.contains(&place) && said.contains(&words), "{said}");
         }

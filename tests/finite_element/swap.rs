@@ -134,7 +134,7 @@ fn the_force_that_a_swap_frees_is_taken_off_in_proportion_to_the_phase() {
                     different from those it found (10.8866 kPa at element 1, point ";
     assert!(words[0].starts_with(expected), "{}", words[0]);
     assert!(
-        words[0].ends_with("9 of 9 points differ), carried to equilibrium in the phase's course"),
+        words[0].ends_with("9 of 9 points differ), applied gradually over the phase"),
         "{}",
         words[0]
     );

@@ -563,13 +563,13 @@ fn water_levels(
         let place = source.place(&written.span());
         if highest < lowest {
             notes.push(format!(
-                "{place}: the water table, {highest} m at its highest, lies below the mesh, which starts at {lowest} m: \
-                 the site is dry"
+                "{place}: the water table, {highest} m at its highest, lies below the lowest point of the mesh at {lowest} m: \
+                 the ground is dry"
             ));
         } else if highest > top + ABOVE * (top - lowest) && top.is_finite() {
             notes.push(format!(
-                "{place}: the water table, {highest} m at its highest, stands above the ground, which ends at {top} m: \
-                 water stands on it"
+                "{place}: the water table, {highest} m at its highest, lies above the highest ground at {top} m: free water \
+                 loads its surface"
             ));
         }
         Ok(())

@@ -105,9 +105,9 @@ fn hint(error: &mechanics::Error) -> Option<String> {
         mechanics::Error::CannotStart(failure)
             if failure.failure.outcome == abi::status::Outcome::CutStep =>
         {
-            "a law must accept a zero increment when its phase begins"
+            "the law failed when it was called with a zero increment at the start of its phase, so that no shorter step can help"
         }
-        mechanics::Error::Singular { .. } => "a part of the model is not supported",
+        mechanics::Error::Singular { .. } => "a part of the model can move freely: add a support",
         mechanics::Error::NoEquilibrium(none) => return Some(after_no_equilibrium(none)),
         mechanics::Error::Interrupted { .. } => "go on with --resume",
         mechanics::Error::Stopped { .. } => {
@@ -121,8 +121,8 @@ fn hint(error: &mechanics::Error) -> Option<String> {
 /// Untried remedies if no equilibrium was found, and the files written by the run.
 fn after_no_equilibrium(none: &NoEquilibrium) -> String {
     let viscous = none.control.relaxes().then_some(if none.viscous {
-        "`control = \"viscous\"` in [solver] takes whole increments and may get further: compare its results with those of other \
-         increments"
+        "`control = \"viscous\"` in [solver] takes whole increments and may get further, but depends more on \
+         them: repeat it with more increments"
     } else {
         "`control = \"viscous\"` in [solver] follows the motion to the next equilibrium and may get further"
     });
@@ -137,8 +137,8 @@ fn after_no_equilibrium(none: &NoEquilibrium) -> String {
         ],
         Reason::Unmet(Iterations::Newton(_, Some(_)), _) => vec![
             viscous.unwrap_or("other increments may get further"),
-            "`convergence = \"force\"` with a force_tolerance of 1e-3 asks for loads in balance alone, where \
-             displacements drift",
+            "`convergence = \"force\"` with `force_tolerance = 1e-3` accepts steps by the balance of forces \
+             alone, although displacements have not settled",
         ],
         Reason::Singular(Some((Singularity::Limit, _))) => viscous.into_iter().collect(),
         _ => Vec::new(),
@@ -157,8 +157,9 @@ fn after_no_equilibrium(none: &NoEquilibrium) -> String {
 fn remedy(mechanism: &Mechanism) -> Option<&'static str> {
     match mechanism.how {
         FailureMode::BondBreaks | FailureMode::Opens if mechanism.is_bare => Some(
-            "a normal stress to begin with (initial stresses, or a phase of weight or pressure before), or a tensile strength, \
-             keeps the bond; without cohesion there is none to break",
+            "the interface starts without normal stress, and the first tension breaks its bond: give it an \
+             initial stress, a phase of weight or pressure before, or a tensile strength, or set its cohesion to \
+             0",
         ),
         FailureMode::BondBreaks => Some(
             "a bond that breaks at once may leave nothing that carries the load: prescribe a displacement instead, or give the \

@@ -95,8 +95,7 @@ pub(crate) fn level(source: &Source, level: &Spanned<LevelInput>) -> Result<Prof
         LevelInput::Points(points) => points.clone(),
     };
     Profile::new(points).ok_or_else(|| {
-        let message = "a water table needs pairs of a distance x (r) and a level, finite numbers, with x \
-                       rising from each to the next: a step takes a small distance";
+        let message = "a water table needs pairs of a distance x (r) and a level, finite numbers, each x greater than the one before. A vertical step takes two points a small distance apart";
         source.error(level.span(), message).into()
     })
 }
@@ -191,7 +190,7 @@ impl StressInput {
         if let Some(given) = components.into_iter().flatten().next() {
             return wrong(
                 given.span(),
-                "components do not go with earth pressure at rest",
+                "`initial_stress` has stress components together with `k_0` or `friction_angle`: give one or the other (keys of a `base` file count, too)",
             );
         }
         let ratio = match (&self.k_0, &self.friction_angle) {

@@ -102,7 +102,10 @@ fn told<'i>(misfit: &Misfit, input: &'i PileInput) -> (&'i Spanned<String>, &'st
             &input.group.0[number],
             "is an interface; a pile is made of `solid` groups",
         ),
-        Misfit::Head => (&input.head, "has no side of the pile's elements"),
+        Misfit::Head => (
+            &input.head,
+            "has no edge of the pile's elements: name the line along the top of the pile",
+        ),
         Misfit::NotAnInterface(number) => (
             &input.shaft.0[number],
             "is no interface; a shaft has `zero_thickness` or `thin_layer` groups",

@@ -7,7 +7,7 @@ use mechanics::Problem;
 use mechanics::ground::pressure_on;
 use mechanics::group::Group;
 use mechanics::mesh::Mesh;
-use mechanics::problem::Formulation;
+use mechanics::problem::{Analysis, Formulation};
 use mechanics::settings::Control;
 use mechanics::{Place, Simulation};
 use results::output_request::Reduce;
@@ -273,18 +273,21 @@ impl Resolver<'_> {
     }
 
     fn unknown_line_quantity(&self, quantity: &Spanned<String>) -> Error {
-        let all = [
-            "displacement_x",
-            "displacement_y",
-            "reaction_x",
-            "reaction_y",
-            "force_x",
-            "force_y",
-        ];
+        let axes = match self.simulation.problem().analysis {
+            Analysis::Axisymmetric => ["r", "z"],
+            Analysis::PlaneStrain => ["x", "y"],
+        };
+        let kinds = ["displacement", "reaction", "force"];
+        let all = kinds
+            .map(|kind| axes.map(|axis| format!("{kind}_{axis}")))
+            .concat();
         let message = format!("a line has no quantity `{}`", quantity.get_ref());
         self.source()
             .error(quantity.span(), message)
-            .hint(suggestion(quantity.get_ref(), all))
+            .hint(suggestion(
+                quantity.get_ref(),
+                all.iter().map(String::as_str),
+            ))
             .into()
     }
 

@@ -300,7 +300,7 @@ fn a_phase_without_a_time_is_told_of() {
     };
     let outcome = place.run_case(held("", "increments = 2"));
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    let said = "phase `hold` has no `time`, and law `soil` depends on time: the phase takes 1";
+    let said = "phase `hold` has no `time`, and law `soil` depends on time: the phase takes 1 unit of time";
     assert!(outcome.says(said), "{}", outcome.stderr);
     assert!(
         !outcome.says("phase `push` has no `time`"),

@@ -34,9 +34,9 @@ impl fmt::Display for FailureMode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::BondBreaks => "a bond breaks",
-            Self::Opens => "a joint opens",
-            Self::Slides => "a joint slides",
-            Self::Crushes => "a joint gives way in compression",
+            Self::Opens => "an interface opens",
+            Self::Slides => "an interface slides",
+            Self::Crushes => "an interface gives way in compression",
             Self::ComesApart => "a body comes apart",
             Self::Yields => "the ground (or another body) yields",
         })

@@ -215,8 +215,8 @@ impl<'a> Constraints<'a> {
         let first = self.mesh.nodes[*free.first()?];
         Some(format!(
             "phase `{}`: {} of {} nodes on the axis r = 0 are free in r, the first at z = {}: they \
-             would leave the axis or cross it. A support of a line with `r = 0.0`, `fixed = [\"r\"]`, \
-             holds them",
+             would leave the axis or cross it. A support of the line along the axis with \
+             `fixed = [\"r\"]` holds them",
             phase.name,
             free.len(),
             held.len() + free.len(),

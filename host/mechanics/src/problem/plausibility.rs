@@ -270,7 +270,10 @@ fn lost(problem: &Problem) -> Vec<String> {
     for (number, group) in problem.groups.iter().enumerate() {
         let mut phases = problem.phases.iter();
         if !group.is_active && !phases.any(|phase| phase.activate.contains(&number)) {
-            warnings.push(format!("group `{}` is active in no phase", group.name));
+            warnings.push(format!(
+                "group `{}` is never active: no phase has it in `activate`",
+                group.name
+            ));
         }
     }
     warnings

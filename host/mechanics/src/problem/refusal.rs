@@ -687,10 +687,10 @@ impl Cause {
                 "leave it out: an interface starts with the stress of the ground beside it"
             }
             Self::AtRestOutsideStrength { .. } => {
-                "K_0 lies between active and passive pressure: at the surface cohesion, or another K_0"
+                "choose K_0 between the ratios of active and passive pressure; near the surface some cohesion also helps"
             }
             Self::LiftedAtRest { .. } => {
-                "`unit_weight` and `saturated_unit_weight` are those of ground and water together, not under buoyancy, in kN/m³"
+                "check the weights of ground in kN/m³ (`saturated_unit_weight` is total, not buoyant), those of the water and its `level`, and the sign of `surcharge` (positive presses down)"
             }
             Self::LostForce(line, axis) => {
                 return Some(format!(
@@ -698,13 +698,13 @@ impl Cause {
                      `reaction_{axis}` of the line is what it takes to hold it"
                 ));
             }
-            Self::OnInterface(..) => "name a line of the body that is meant, beside the interface",
+            Self::OnInterface(..) => "name a line that belongs to the pile or to the ground alone",
             Self::TensionAtRest { .. } => {
                 "with much unloading (`ocr`, `pop`) a smaller `poisson_ratio`, or give `k_0` itself"
             }
             Self::AlreadySo {
                 is_active: true, ..
-            } => "`active = false` on the group keeps it out from the start",
+            } => "an earlier phase activates it, or it lacks `active = false`",
             Self::LocalAxes { .. } => "use the formulation `thin_layer`",
             Self::FreeForNothing { .. } => {
                 "leave one of the two out; a displacement stays until a phase frees it"

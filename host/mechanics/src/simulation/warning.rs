@@ -142,12 +142,13 @@ impl Warning {
 }
 
 /// Single corrections are tried.
-const SINGLY: &str = "nothing else found an equilibrium, as where bonds break; viscous control takes single corrections, so that \
-                      broken bonds stay broken. Which bonds break can depend on the steps: compare with a run with more increments";
+const SINGLY: &str = "no other way found an equilibrium; viscous control goes on by single corrections, and bonds that \
+                      break stay broken. Which bonds break can depend on the step size: compare with a run with more \
+                      increments";
 
 /// Advice after viscous control.
 const COMPARE: &str =
-    "Plastic flow on its way stays in the state: compare with a run with more increments";
+    "Plastic strains from this path stay in the result: compare with a run with more increments";
 
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -165,7 +166,7 @@ impl fmt::Display for Warning {
             ),
             Self::NoTime { phase, law, by } => write!(
                 f,
-                "phase `{phase}` has no `time`, and law `{law}`{by} depends on time: the phase takes 1"
+                "phase `{phase}` has no `time`, and law `{law}`{by} depends on time: the phase takes 1 unit of time"
             ),
             Self::RoundOff {
                 phase,
@@ -219,25 +220,25 @@ impl fmt::Display for Warning {
                 at: [x, y],
             } => write!(
                 f,
-                "phase `{phase}`: nodes that move alike, one at ({x:.4}, {y:.4}), had moved {by:.3e} m apart before they \
-                 became one; `displacement` leads them to one place, which bends them straight; `reset_displacements` \
-                 in this phase counts from where they stand"
+                "phase `{phase}`: nodes that are now tied together, one at ({x:.4}, {y:.4}), had displacements {by:.3e} m apart. The \
+                 prescribed `displacement` removes this difference, which strains the body; `reset_displacements = \
+                 true` in this phase avoids it"
             ),
             Self::Restored(place, change) => write!(f, "{place}: {change}"),
             Self::GroupSplit(phase, parted) => write!(f, "phase `{phase}`: {parted}"),
             Self::TookOver(phase, change) => write!(
                 f,
-                "phase `{phase}`: {change}, carried to equilibrium in the phase's course"
+                "phase `{phase}`: {change}, applied gradually over the phase"
             ),
             Self::Unasked(phase, reason) => write!(
                 f,
-                "phase `{phase}`: {reason}\n  over a nil increment, so that what the law makes of the \
-                 stresses it finds comes in the first increment, unannounced"
+                "phase `{phase}`: {reason}\n  when the law is called with zero strain. Whether it changes the stresses it takes over is unknown; \
+                 any change comes in the first increment"
             ),
             Self::TurnedViscous(place) => write!(
                 f,
-                "{place}: shorter and shorter load steps found no equilibrium; viscous control takes short steps to the end \
-                 of the increment. {COMPARE}"
+                "{place}: even short load steps found no equilibrium; the rest of the increment is computed under viscous \
+                 control. {COMPARE}"
             ),
             Self::SingleCorrections(place) => write!(f, "{place}: {SINGLY}"),
             Self::FollowedPath {
@@ -246,8 +247,8 @@ impl fmt::Display for Warning {
                 between: [lowest, highest],
             } => write!(
                 f,
-                "{place}: the load could not simply rise from {start:.4} of the phase; the path of \
-                 equilibrium was followed between {lowest:.4} and {highest:.4} (path.csv)"
+                "{place}: from {start:.4} of the phase on, no equilibrium is near at a higher load; arc length followed the \
+                 path between {lowest:.4} and {highest:.4} (path.csv)"
             ),
         }
     }
@@ -302,8 +303,8 @@ fn motions(f: &mut fmt::Formatter<'_>, phase: &str, relaxed: usize, viscous: usi
 fn out_of_balance(f: &mut fmt::Formatter<'_>, phase: &str, share: f64) -> fmt::Result {
     write!(
         f,
-        "phase `{phase}` starts out of balance: its initial stresses and loads differ by {} % of the forces in play, and the ground \
-         moves until they balance",
+        "phase `{phase}` starts out of balance by {} % of the forces in play: stresses at its start do not fit weight and \
+         loads, and the ground deforms. Check `surcharge`, `initial_stress` and swapped laws",
         if share < 1e-4 {
             format!("{:.1e}", 100.0 * share)
         } else {
@@ -315,7 +316,7 @@ fn out_of_balance(f: &mut fmt::Formatter<'_>, phase: &str, share: f64) -> fmt::R
 fn cut_back(f: &mut fmt::Formatter<'_>, place: &Place, in_halves: Neighbour) -> fmt::Result {
     write!(
         f,
-        "{place}: steps were cut back, and results depend on the steps: two halves of one step "
+        "{place}: results depend on the step size: the same step in two halves "
     )?;
     match in_halves {
         Neighbour::Apart {
@@ -323,9 +324,9 @@ fn cut_back(f: &mut fmt::Formatter<'_>, place: &Place, in_halves: Neighbour) -> 
             forces,
         } => write!(
             f,
-            "differ from the whole by {displacements:.1e} of its displacements and {forces:.1e} of its changes of forces"
+            "differs by {displacements:.1e} in displacements and {forces:.1e} in forces, as shares of the step"
         )?,
-        Neighbour::None => write!(f, "find no equilibrium")?,
+        Neighbour::None => write!(f, "finds no equilibrium")?,
     }
     write!(f, ". Compare with a run with more increments")
 }

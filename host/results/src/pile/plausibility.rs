@@ -10,6 +10,8 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 /// as it does, in diameters.
 const SOFT: f64 = 1.0;
 const STIFF: f64 = 1e-8;
+/// A force that is so many times what a pile carries was typed in another unit.
+const MANY: f64 = 20.0;
 
 impl Pile {
     /// Warnings about the pile before it is loaded.
@@ -62,7 +64,14 @@ impl Pile {
             let is_ground = |number: &usize| {
                 groups[*number].formulation == Formulation::Solid
                     && !self.parts.groups.contains(number)
-                    && nodes_of(*number).any(|node| own.contains(node))
+                    && {
+                        let kinematics = &groups[*number].kinematics;
+                        // A side has three nodes; a corner alone is not beside it.
+                        (0..kinematics.n_elements()).any(|element| {
+                            let nodes = kinematics.nodes(element).iter();
+                            nodes.filter(|node| own.contains(node)).count() >= 3
+                        })
+                    }
             };
             let ground = (0..groups.len()).filter(is_ground).filter_map(operator);
             // Constrained and shear modulus of the stiffest ground there.
@@ -79,18 +88,18 @@ impl Pile {
                 let layer = modulus / stiffness;
                 let (law, group) = (&groups[joint].law.name, &groups[joint].name);
                 let of = format!(
-                    "[pile]: interface `{group}`, law `{law}`: its elastic {name} stiffness, {stiffness:.1e} kPa/m, "
+                    "[pile]: interface `{group}`, law `{law}`: its {name} stiffness of {stiffness:.1e} kPa/m "
                 );
                 if layer > SOFT * diameter {
                     said.push(format!(
-                        "{of}is that of {layer:.2} m of the ground beside it. Settlements depend on it: {} kPa/m are as stiff as \
-                         a layer of a twentieth of the diameter",
+                        "{of}is low: it deforms as much as {layer:.2} m of the stiffest ground beside it. This adds to the \
+                         settlement; {} kPa/m are as stiff as a layer of a twentieth of the diameter",
                         rounded(20.0 * modulus / diameter)
                     ));
                 } else if layer < STIFF * diameter {
                     said.push(format!(
-                        "{of}is that of {layer:.0e} m of the ground beside it. Its slip is lost in rounding: {} kPa/m are as stiff \
-                         as a layer of a thousandth of the diameter",
+                        "{of}is so high that jumps of displacement are lost in round-off. {} kPa/m, as stiff as a layer of a \
+                         thousandth of the diameter, is enough",
                         rounded(1000.0 * modulus / diameter)
                     ));
                 }
@@ -123,7 +132,7 @@ impl Pile {
         let mut joints = self.parts.shaft.iter().copied().chain(base);
         if let Some(absent) = joints.find(|&group| !is_active(group)) {
             return Some(format!(
-                "interface `{}` is not active",
+                "interface `{}` is not active yet. Activate it earlier, or load the head later",
                 problem.groups[absent].name
             ));
         }
@@ -137,7 +146,7 @@ impl Pile {
         own.copied().find_map(|pile| {
             let (_, name) = ground.iter().find(|(group, _)| law(*group) == law(pile))?;
             Some(format!(
-                "group `{}` has law `{}`, that of the ground (group `{name}`)",
+                "group `{}` still has law `{}` of the ground (group `{name}`). Swap it with `laws` in an earlier phase",
                 problem.groups[pile].name,
                 law(pile)
             ))
@@ -176,8 +185,7 @@ impl Pile {
             let why = self.not_in_place(problem, number)?;
             (self.head_moves(phase) != [0.0, 0.0]).then(|| {
                 format!(
-                    "[pile]: phase `{}` loads the head before the pile is in place: {why}. No resistance is reported from \
-                     this phase",
+                    "[pile]: phase `{}` loads the head, but {why}; no resistance is reported from this phase",
                     phase.name
                 )
             })
@@ -243,13 +251,13 @@ impl Pile {
             };
             format!(": {part}{}", mechanism.how)
         });
-        let unlike = if (carried - start).abs() < 0.05 * (end - start).abs() {
-            format!(
-                "The force given is {:.0} times that: forces are in {unit}, is it in N?",
-                (end / carried).abs()
-            )
+        let unlike = if (carried - start).abs() < 0.05 * (end - start).abs()
+            && end.abs() > MANY * carried.abs()
+        {
+            format!("Forces are in {unit}: was it typed in N?")
         } else {
-            "To follow it further, push the head by `displacement` instead of `force`".to_owned()
+            "To follow it further, prescribe a `displacement` of the head instead of a `force`"
+                .to_owned()
         };
         Some(format!(
             "pile: {way} of {:.1} {unit}, where phase `{}` asks for {:.1}{}. {unlike}",
@@ -365,8 +373,8 @@ impl Pile {
             }
             let [low, high] = ends(z.into_iter());
             said.push(format!(
-                "[pile]: group `{}` touches the pile between z = {low:.4} and {high:.4} m and is not among its `shaft`: \
-                 what holds the pile there counts as shaft, and has no friction in pile.csv",
+                "[pile]: group `{}` touches the pile between z = {low:.4} and {high:.4} m and is not listed in `shaft`. Its force counts in the shaft load, and pile.csv has no friction there: \
+                 add it to `shaft`",
                 group.name
             ));
         }
@@ -394,9 +402,9 @@ impl Pile {
         let width = self.geometry.width;
         self.sides(simulation).iter().any(upright).then(|| {
             format!(
-                "[pile]: the pile stands on a line that is held in x, as one half of a pile on its plane of symmetry. \
-                 Its loads are those of the half, and its criteria take the half's width of {width} m, unless \
-                 `diameter` names another, such as {}",
+                "[pile]: in plane strain the pile is held in x along its own line, as half of a wall on its plane of \
+                 symmetry. Loads are those of the half, and criteria use its width of {width} m; `diameter = {}` is \
+                 the full width. A round pile needs `analysis = \"axisymmetric\"`",
                 2.0 * width
             )
         })
