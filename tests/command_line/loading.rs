@@ -427,15 +427,15 @@ fn loads_and_displacements_on_an_interface_are_refused() {
     for (does, says) in [
         (
             "force = [{ line = \"middle\", x = 1.0 }]",
-            "a force on line `middle`, along which zero-thickness elements stand",
+            "a force on line `middle`, which carries interface elements",
         ),
         (
             "pressure = [{ line = \"middle\", value = 1.0 }]",
-            "a pressure on line `middle`, along which zero-thickness elements stand",
+            "a pressure on line `middle`, which carries interface elements",
         ),
         (
             "displacement = [{ line = \"middle\", x = 1e-3 }]",
-            "a displacement on line `middle`, along which zero-thickness elements stand",
+            "a displacement on line `middle`, which carries interface elements",
         ),
     ] {
         let text = with_phases(&there, &[("rest", ""), ("do", does)]);
@@ -446,7 +446,7 @@ fn loads_and_displacements_on_an_interface_are_refused() {
     refused(
         &held,
         "line = \"middle\"\nfixed",
-        &["a support on line `middle`, along which zero-thickness"],
+        &["a support on line `middle`, which carries interface elements"],
     );
     // Before the interface comes its faces are one; where it comes they are two.
     let force = ("load", "force = [{ line = \"middle\", y = -100.0 }]");
@@ -458,7 +458,7 @@ fn loads_and_displacements_on_an_interface_are_refused() {
     refused(
         &text,
         "activate = [\"joint\"]",
-        &["a force on line `middle`, along which zero-thickness"],
+        &["a force on line `middle`, which carries interface elements"],
     );
     let off = (
         "comes",
@@ -500,13 +500,16 @@ fn water_below_the_mesh_and_above_the_ground_is_said() {
     };
     // The middle of the lower block has 1.5 m of dry ground above it.
     close(
-        &says("-7.5", &["-7.5 m", "below the mesh", "0 m", "dry"]),
+        &says(
+            "-7.5",
+            &["-7.5 m", "below the lowest point of the mesh", "0 m", "dry"],
+        ),
         &[-27.0],
     );
     close(&says("0.0", &[]), &[-27.0]);
     // 20 − 9.81 kN/m³ under a lake.
     close(
-        &says("2.5", &["2.5 m", "above the ground", "2 m"]),
+        &says("2.5", &["2.5 m", "above the highest ground", "2 m"]),
         &[-1.5 * (20.0 - 9.81)],
     );
     close(&says("2.0", &[]), &[-1.5 * (20.0 - 9.81)]);

@@ -685,7 +685,7 @@ fn what_is_odd_about_a_pile_is_said_before_it_is_loaded() {
         (
             ("shaft = [\"upper\", \"lower\"]", "shaft = [\"upper\"]"),
             Some(
-                "group `lower` touches the pile between z = -5.0000 and -3.0000 m and is not among its `shaft`",
+                "group `lower` touches the pile between z = -5.0000 and -3.0000 m and is not listed in `shaft`",
             ),
         ),
         (

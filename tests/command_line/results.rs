@@ -82,7 +82,7 @@ fn warns_of_a_phase_that_starts_out_of_balance() {
          [[phase]]\nname = \"push\"\nfree = [{ line = \"middle\", components = [\"x\"] }]",
     )]));
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    let warning = "phase `push` starts out of balance: ";
+    let warning = "phase `push` starts out of balance by ";
     assert!(outcome.says(warning), "{}", outcome.stderr);
     assert_warns(&place, warning);
 }

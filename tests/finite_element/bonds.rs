@@ -122,7 +122,7 @@ fn a_load_that_no_bond_carries_names_what_gives_way() {
         ["bond_breaks", "opens", "slides"].contains(&how.as_str()),
         "{message}"
     );
-    assert!(message.contains("what gives way: a "), "{message}");
+    assert!(message.contains("what gives way: a"), "{message}");
     assert!(
         message.contains("group `joint`, element 1, point"),
         "{message}"

@@ -86,7 +86,7 @@ fn what_is_said_of_a_step_after_a_cut_back_is_what_half_increments_make() {
     };
     let cut = run(&(text(footing) + "[solver]\nmax_iterations = 6\n"));
     let said = cut.observer.warnings.iter();
-    let said = said.filter(|warning| warning.contains("steps were cut back, and results"));
+    let said = said.filter(|warning| warning.contains("results depend on the step size"));
     assert_eq!(said.count(), 1, "{:?}", cut.observer.warnings);
     // In the first step that is left nothing flows; the second one is spoken of.
     let iterations = cut.events("iteration");

@@ -367,7 +367,7 @@ fn a_tilted_line_that_became_rigid_is_led_to_one_place() {
         heard
             .0
             .iter()
-            .filter(|said| said.contains("`push`: nodes that move alike"))
+            .filter(|said| said.contains("`push`: nodes that are now tied together"))
             .count()
     };
     for line in ["top", "corners"] {

@@ -597,7 +597,7 @@ impl fmt::Display for Cause {
             ),
             Self::RigidInterface(line) => write!(
                 f,
-                "line `{line}`, along which zero-thickness elements stand, would be rigid on both of their \
+                "line `{line}`, which carries interface elements, would be rigid on both of their \
                  faces, and nothing could slip or open there"
             ),
             Self::LostForce(line, axis) => write!(
@@ -622,7 +622,7 @@ impl fmt::Display for Cause {
             Self::OutOfRange(what) => write!(f, "{what} refers to what there is not"),
             Self::OnInterface(what, line) => write!(
                 f,
-                "a {what} on line `{line}`, along which zero-thickness elements stand, would {}",
+                "a {what} on line `{line}`, which carries interface elements, would {}",
                 match *what {
                     "pressure" => "act on one of their faces only",
                     "force" => "act on both of their faces, half of it on each",

@@ -438,11 +438,11 @@ mod tests {
             forces: 5e-4,
         });
         assert!(
-            apart.contains("by 2.0e-3 of its displacements and 5.0e-4 of its changes"),
+            apart.contains("by 2.0e-3 in displacements and 5.0e-4 in forces"),
             "{apart}"
         );
         let none = of(Neighbour::None);
-        assert!(none.contains("find no equilibrium"), "{none}");
+        assert!(none.contains("finds no equilibrium"), "{none}");
     }
 
     #[test]
