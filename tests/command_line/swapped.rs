@@ -34,13 +34,13 @@ fn a_law_that_fails_over_a_nil_increment_starts_with_the_first_one() {
         return;
     };
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    for words in ["no time passes", "over a nil increment", "phase `push`"] {
+    for words in ["no time passes", "called with zero strain", "phase `push`"] {
         assert!(outcome.says(words), "{words}: {}", outcome.stderr);
     }
     // Asked without trouble, it keeps what it finds, and nothing is said.
     let outcome = run("").expect("a compiler");
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(!outcome.says("nil increment"), "{}", outcome.stderr);
+    assert!(!outcome.says("called with zero strain"), "{}", outcome.stderr);
     assert!(!outcome.says("takes over"), "{}", outcome.stderr);
 }
 

@@ -14,7 +14,7 @@
 //!
 //! so that Σ_q W_q σ_q · ε_q = ∫ σ · B dV u, the virtual work of (1). Every stress that is linear in the coordinates
 //! has the form (1), also with curved sides. So weight and earth pressure at rest balance to round-off. In plane
-//! strain, and in rectangles, (2) is the strain at the point itself.
+//! strain with straight sides (2) is the strain at the point itself.
 //!
 //! A quad with four functions has one motion without strains (2). With bent sides, stresses whose directions turn with
 //! the side do work in it, and a free wall moves to and fro. Quads therefore have three points along bent sides,

@@ -526,9 +526,9 @@ impl fmt::Display for Cause {
             }
             Self::AlreadySo { group, is_active } => write!(
                 f,
-                "group `{group}` is {} at the start of this phase",
+                "group `{group}` is {} when this phase starts",
                 if *is_active {
-                    "active already"
+                    "already active"
                 } else {
                     "not active"
                 }
@@ -602,8 +602,8 @@ impl fmt::Display for Cause {
             ),
             Self::LostForce(line, axis) => write!(
                 f,
-                "the force on line `{line}` has no effect in {axis}: its displacement there is held or prescribed as long \
-                 as it lasts"
+                "the force on line `{line}` has no effect in {axis}: the line is held there, or its displacement is prescribed, \
+                 throughout"
             ),
             Self::NoPoreStiffness {
                 group,
