@@ -40,7 +40,11 @@ fn a_law_that_fails_over_a_nil_increment_starts_with_the_first_one() {
     // Asked without trouble, it keeps what it finds, and nothing is said.
     let outcome = run("").expect("a compiler");
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(!outcome.says("called with zero strain"), "{}", outcome.stderr);
+    assert!(
+        !outcome.says("called with zero strain"),
+        "{}",
+        outcome.stderr
+    );
     assert!(!outcome.says("takes over"), "{}", outcome.stderr);
 }
 
