@@ -333,7 +333,7 @@ fn carry_out(
     if let Some(plunge) = &plunge {
         follower.observer.note(plunge);
     }
-    follower.tell_results();
+    follower.tell_results(outcome.is_ok());
     let Follower {
         observer,
         mut results,
@@ -379,8 +379,10 @@ impl Follower<'_> {
     }
 
     /// Tells what has come out: the resistances of a pile, the error of the mesh.
-    fn tell_results(&mut self) {
-        if let Some(resistances) = self.results.resistances() {
+    fn tell_results(&mut self, is_done: bool) {
+        let resistances = self.results.resistances();
+        // A run that ends in its first increments has no pile to tell of.
+        if let Some(resistances) = resistances.filter(|pile| is_done || pile.phase.is_some()) {
             self.observer.pile(&resistances);
         }
         if let Some(of_mesh) = self.results.mesh_error() {

@@ -138,6 +138,26 @@ impl Curve {
         })
     }
 
+    /// How far the last phase pulls the head up, and with which force, if it does.
+    fn uplift(&self, unit: &str) -> Option<String> {
+        let (last, before) = self.0.split_last()?;
+        let start = before.iter().rev().find_map(|phase| phase.points.last());
+        let start = start.filter(|_| !last.resets).map_or(0.0, |point| point[0]);
+        let end = last.points.last()?[0];
+        let force = last
+            .points
+            .iter()
+            .map(|point| -point[1])
+            .fold(0.0, f64::max);
+        (end < start && force > 0.0).then(|| {
+            format!(
+                "phase `{}` pulls the head up by {:.4} m, with at most {force:.1} {unit}",
+                last.phase,
+                start - end
+            )
+        })
+    }
+
     /// Resistances of a pile with this course.
     pub fn resistances(&self, pile: &Pile) -> Resistances {
         self.of(
@@ -153,7 +173,9 @@ impl Curve {
             points,
         }) = self.last_push()
         else {
-            let why = "the head moves down in no phase with the pile in place".to_owned();
+            let why = self.uplift(unit).unwrap_or_else(|| {
+                "the head moves down in no phase with the pile in place".to_owned()
+            });
             return Resistances {
                 phase: None,
                 unit,
@@ -169,7 +191,8 @@ impl Curve {
             phase: Some(phase.phase.clone()),
             unit,
             diameter,
-            ten_percent: ten_percent(&points, diameter),
+            ten_percent: ten_percent(&points, diameter)
+                .map_err(|why| self.uplift(unit).unwrap_or(why)),
             davisson: phase
                 .stiffness
                 .ok_or_else(|| "the law of the pile's head has no elastic operator".to_owned())

@@ -85,6 +85,10 @@ impl Pile {
                 ("normal", constrained, stiffness[0]),
                 ("shear", shear, stiffness[3]),
             ] {
+                if stiffness <= 0.0 {
+                    // It grows with the normal stress, and there is none yet.
+                    continue;
+                }
                 let layer = modulus / stiffness;
                 let (law, group) = (&groups[joint].law.name, &groups[joint].name);
                 let of = format!(
