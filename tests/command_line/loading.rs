@@ -439,7 +439,11 @@ fn loads_and_displacements_on_an_interface_are_refused() {
         ),
     ] {
         let text = with_phases(&there, &[("rest", ""), ("do", does)]);
-        refused(&text, does, &[says, "beside the interface"]);
+        refused(
+            &text,
+            does,
+            &[says, "belongs to the pile or to the ground alone"],
+        );
     }
     let held =
         with_phases(&there, &[("rest", "")]).replace("line = \"bottom\"", "line = \"middle\"");
@@ -521,7 +525,7 @@ fn water_below_the_mesh_and_above_the_ground_is_said() {
     let (said, _) = run(&rise, "s_low");
     assert!(
         said.iter()
-            .any(|said| said.contains("above the ground, which ends at 2 m")),
+            .any(|said| said.contains("lies above the highest ground at 2 m")),
         "{said:?}"
     );
 }

@@ -713,7 +713,7 @@ fn what_is_odd_about_a_pile_is_said_before_it_is_loaded() {
         ),
         (
             ("analysis = \"axisymmetric\"", plane),
-            Some("the half's width of 0.4 m, unless `diameter` names another, such as 0.8"),
+            Some("criteria use its width of 0.4 m; `diameter = 0.8` is the full width"),
         ),
         (
             ("head = \"head\"\n", "head = \"head\"\ndiameter = 0.8\n"),

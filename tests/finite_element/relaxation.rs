@@ -296,8 +296,7 @@ fn viscous_control_leads_where_steps_of_the_load_fail() {
     let viscous_from: Vec<_> = phases.iter().map(|p| p["viscous_from"].as_u64()).collect();
     assert_eq!(viscous_from, [None, Some(1), None]);
     let warnings = &auto.observer.warnings;
-    let says =
-        |warning: &&String| warning.contains("`lift`, increment 1: shorter and shorter load steps");
+    let says = |warning: &&String| warning.contains("`lift`, increment 1: even short load steps");
     assert_eq!(warnings.iter().filter(says).count(), 1, "{warnings:?}");
     // The load with more halvings gets there, too.
     let halved = run(&punch(OWN, "load"));
