@@ -191,8 +191,10 @@ impl Curve {
             phase: Some(phase.phase.clone()),
             unit,
             diameter,
-            ten_percent: ten_percent(&points, diameter)
-                .map_err(|why| self.uplift(unit).unwrap_or(why)),
+            ten_percent: ten_percent(&points, diameter).map_err(|why| match self.uplift(unit) {
+                Some(uplift) => format!("{why}; {uplift}"),
+                None => why,
+            }),
             davisson: phase
                 .stiffness
                 .ok_or_else(|| "the law of the pile's head has no elastic operator".to_owned())
