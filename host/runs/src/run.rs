@@ -323,16 +323,7 @@ fn carry_out(
     for warning in beyond.iter().chain(&unreliable) {
         follower.say(warning);
     }
-    let plunge = match &outcome {
-        Err(mechanics::Error::NoEquilibrium(none)) => {
-            follower.results.plunge(simulation.problem(), none)
-        }
-        _ => None,
-    };
     let outcome = outcome.map_err(|error| explained(case, &simulation, error, &mut follower));
-    if let Some(plunge) = &plunge {
-        follower.observer.note(plunge);
-    }
     follower.tell_results(outcome.is_ok());
     let Follower {
         observer,
@@ -616,6 +607,11 @@ fn explained(
     error: mechanics::Error,
     follower: &mut Follower<'_>,
 ) -> Error {
+    if let mechanics::Error::NoEquilibrium(none) = &error
+        && let Some(plunge) = follower.results.plunge(simulation.problem(), none)
+    {
+        follower.observer.note(&plunge);
+    }
     let kept = keep_capsule(case, simulation, &error, &follower.results);
     let suspicion = || suspicion(simulation, &error);
     let hint = match &kept {

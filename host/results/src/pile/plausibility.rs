@@ -124,7 +124,7 @@ impl Pile {
         };
         let law = |group: usize| {
             let swaps = phases.iter().flat_map(|phase| &phase.materials);
-            let last = swaps.filter(|(of, _)| *of == group).last();
+            let last = swaps.rev().find(|(of, _)| *of == group);
             &last
                 .map_or(&problem.groups[group].material, |(_, law)| law)
                 .name
