@@ -46,25 +46,27 @@ fn a_small_run_that_takes_long_has_all_threads() {
         let mut command = place.command(&run);
         command.stdout(Stdio::null()).stderr(Stdio::null());
         let mut watcher = command.spawn().unwrap();
-        let threads = threads_of_child(watcher.id());
+        let most = most_threads_of_child(watcher.id());
         watcher.kill().unwrap();
         watcher.wait().unwrap();
-        assert_eq!(threads, n, "{arguments:?}");
+        assert_eq!(most, n, "{arguments:?}");
     }
 }
 
-/// Threads of the watched process after two seconds. Libraries are opened in a thread of their own before.
-fn threads_of_child(watcher: u32) -> usize {
+/// Most threads that the watched process has for 25 ms or more in its first second. (A library is opened in a thread of
+/// its own, which is gone sooner.)
+fn most_threads_of_child(watcher: u32) -> usize {
     let begun = Instant::now();
-    let mut last = 0;
-    while begun.elapsed() < Duration::from_secs(2) {
+    let mut seen: BTreeMap<usize, usize> = BTreeMap::new();
+    while begun.elapsed() < Duration::from_secs(1) {
         let children = format!("/proc/{watcher}/task/{watcher}/children");
         let children = std::fs::read_to_string(children).unwrap_or_default();
         for child in children.split_whitespace() {
             let threads = std::fs::read_dir(format!("/proc/{child}/task"));
-            last = threads.map_or(last, Iterator::count);
+            *seen.entry(threads.map_or(0, Iterator::count)).or_default() += 1;
         }
         std::thread::sleep(Duration::from_millis(5));
     }
-    last
+    let long = seen.into_iter().rev().find(|(_, samples)| *samples >= 5);
+    long.map_or(0, |(threads, _)| threads)
 }

@@ -237,7 +237,8 @@ fn places(repository: &Path, metadata: &Metadata) -> Result<Places, Error> {
 fn is_for_users(file: &Path) -> bool {
     let is_left = file.components().any(|part| part.as_os_str() == "results");
     let endings = [
-        "md", "ipynb", "toml", "csv", "svg", "msh", "geo", "py", "sh", "sbatch", "txt",
+        "md", "ipynb", "toml", "csv", "svg", "msh", "geo", "py", "sh", "sbatch", "txt", "f90",
+        "inc",
     ];
     let ending = file.extension().and_then(|ending| ending.to_str());
     !is_left && (file.ends_with("Snakefile") || ending.is_some_and(|e| endings.contains(&e)))
