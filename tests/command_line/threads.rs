@@ -3,6 +3,7 @@
 
 use crate::program::{BAD_INPUT, CASE, DONE, Place};
 use crate::troubled;
+use std::collections::BTreeMap;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
