@@ -110,7 +110,7 @@ def test_types_are_checked(here: Path) -> None:
     """mypy accepts the package, and the stubs next to the module."""
     if importlib.util.find_spec("mypy") is None:
         missing("mypy")
-    for check in (["mypy", "--strict", "-p", "pilum"], ["mypy.stubtest", "pilum._pilum", "--ignore-missing-stub"]):
+    for check in (["mypy", "--strict", "--no-namespace-packages", "-p", "pilum"], ["mypy.stubtest", "pilum._pilum", "--ignore-missing-stub"]):
         done = subprocess.run([sys.executable, "-m", *check], capture_output=True, text=True)
         assert done.returncode == 0, done.stdout + done.stderr
 
