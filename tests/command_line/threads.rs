@@ -54,8 +54,8 @@ fn a_small_run_that_takes_long_has_all_threads() {
     }
 }
 
-/// Most threads that the watched process has for 25 ms or more in its first second. (A library is opened in a thread of
-/// its own, which is gone sooner.)
+/// Most threads that the watched process has for 25 ms or more in its first second. (The thread that opens a library
+/// ends sooner.)
 fn most_threads_of_child(watcher: u32) -> usize {
     let begun = Instant::now();
     let mut seen: BTreeMap<usize, usize> = BTreeMap::new();

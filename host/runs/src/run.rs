@@ -150,7 +150,7 @@ fn all_warnings(
     all.extend(notes);
     all.extend(case.warnings(simulation));
     let pile = wanted.pile.iter();
-    all.extend(pile.flat_map(|pile| pile.oddities(simulation)));
+    all.extend(pile.flat_map(|pile| pile.warnings(simulation)));
     all
 }
 

@@ -6,16 +6,16 @@ use mechanics::problem::{Analysis, Axis, Formulation, Phase};
 use mechanics::{NoEquilibrium, Problem, Simulation};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-/// An interface is soft, or too stiff for the digits of numbers, beyond these thicknesses of ground that yield as much
-/// as it does, in diameters.
+/// Thickness, in diameters, of the layer of ground that is as stiff as an interface: above the first the interface is
+/// soft, below the second its jumps are lost in round-off.
 const SOFT: f64 = 1.0;
 const STIFF: f64 = 1e-8;
-/// A force that is so many times what a pile carries was typed in another unit.
+/// A force above this multiple of the load carried was probably typed in another unit.
 const MANY: f64 = 20.0;
 
 impl Pile {
     /// Warnings about the pile before it is loaded.
-    pub fn oddities(&self, simulation: &Simulation) -> Vec<String> {
+    pub fn warnings(&self, simulation: &Simulation) -> Vec<String> {
         let mut said = self.of_head(simulation);
         said.extend(self.of_shaft(simulation));
         said.extend(self.beside_shaft(simulation));
@@ -25,6 +25,15 @@ impl Pile {
         said.extend(self.loaded_too_early(simulation.problem()));
         said.extend(self.only_pulled(simulation.problem()));
         said
+    }
+
+    /// Groups of the interfaces along its shaft and at its base.
+    fn joints(&self) -> impl Iterator<Item = usize> {
+        let base = match self.parts.base {
+            Base::Group(group) => Some(group),
+            Base::Line(_) => None,
+        };
+        self.parts.shaft.iter().copied().chain(base)
     }
 
     /// A diameter that is less than that of the shaft: a radius, most likely.
@@ -43,18 +52,15 @@ impl Pile {
         })
     }
 
-    /// Interfaces that yield as much as a thick layer of the ground, or are so stiff that their slip is lost in rounding.
+    /// Interfaces that are as soft as a thick layer of the ground, or so stiff that their jumps are lost in round-off.
     fn soft(&self, simulation: &Simulation) -> Vec<String> {
         let groups = simulation.groups();
         let operator = |number: usize| groups[number].elastic_operator(0);
-        let base = match self.parts.base {
-            Base::Group(group) => Some(group),
-            Base::Line(_) => None,
-        };
-        let joints = self.parts.shaft.iter().copied().chain(base);
         let diameter = self.diameter();
         let mut said = Vec::new();
-        for joint in joints.filter(|&joint| groups[joint].formulation == Formulation::ZeroThickness)
+        for joint in self
+            .joints()
+            .filter(|&joint| groups[joint].formulation == Formulation::ZeroThickness)
         {
             let nodes_of = |number: usize| {
                 let kinematics = &groups[number].kinematics;
@@ -129,12 +135,7 @@ impl Pile {
                 .map_or(&problem.groups[group].material, |(_, law)| law)
                 .name
         };
-        let base = match self.parts.base {
-            Base::Group(group) => Some(group),
-            Base::Line(_) => None,
-        };
-        let mut joints = self.parts.shaft.iter().copied().chain(base);
-        if let Some(absent) = joints.find(|&group| !is_active(group)) {
+        if let Some(absent) = self.joints().find(|&group| !is_active(group)) {
             return Some(format!(
                 "interface `{}` is not active yet. Activate it earlier, or load the head later",
                 problem.groups[absent].name
