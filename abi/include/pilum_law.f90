@@ -17,7 +17,7 @@ module pilum
 
   integer(c_int32_t), parameter :: PILUM_MAGIC_NUMBER = int(z'50494C4D', c_int32_t)
   integer(c_int16_t), parameter :: PILUM_ABI_MAJOR = 1
-  integer(c_int16_t), parameter :: PILUM_ABI_MINOR = 1
+  integer(c_int16_t), parameter :: PILUM_ABI_MINOR = 0
   integer(c_int64_t), parameter :: PILUM_LAYOUT_HASH = int(z'B8583DA8C195E927', c_int64_t)
 
   integer(c_int32_t), parameter :: PILUM_OK = 0
@@ -101,7 +101,6 @@ module pilum
     type(pilum_view_mut) :: flux1, state1, tangent
     type(c_ptr) :: status, step_factor, message
     integer(c_size_t) :: message_capacity
-    ! Since version 1.1.
     real(c_double) :: step_time
     type(c_ptr) :: rates
   end type
@@ -153,8 +152,7 @@ module pilum
     ! Internal variables at the start.
     real(dp) :: state(MAX_STATES)
     real(dp) :: time, time_increment
-    ! Time at the start, counted from the start of the phase or segment; 0 where the host is of
-    ! version 1.0.
+    ! Time at the start, counted from the start of the phase or segment.
     real(dp) :: step_time
   end type
 
@@ -581,23 +579,20 @@ contains
   end subroutine
 
   ! Instance and batch of a call, and a message that ends; `status` says if they can be used.
-  subroutine open_call(opaque, call_of_host, known, instance, batch, knows_step_time, status)
+  subroutine open_call(opaque, call_of_host, known, instance, batch, status)
     type(c_ptr), intent(in) :: opaque, call_of_host
     integer(c_int32_t), intent(in) :: known
     type(instance_type), pointer, intent(out) :: instance
     type(pilum_batch), pointer, intent(out) :: batch
-    logical, intent(out) :: knows_step_time
     integer(c_int32_t), intent(out) :: status
-    ! Sizes of the batch in version 1.0, and with the first field that came later.
-    integer(c_int32_t), parameter :: SIZE_1_0 = 240, SIZE_WITH_STEP_TIME = 248
+    ! Size of the batch in version 1.0.
+    integer(c_int32_t), parameter :: SIZE_1_0 = 256
     integer(c_int32_t), pointer :: struct_size
     status = PILUM_E_ARGUMENT
     nullify (instance, batch)
-    knows_step_time = .false.
     if (.not. c_associated(call_of_host)) return
     call c_f_pointer(call_of_host, struct_size)
     if (struct_size < SIZE_1_0) return
-    knows_step_time = struct_size >= SIZE_WITH_STEP_TIME
     call c_f_pointer(call_of_host, batch)
     call say(batch%message, batch%message_capacity, '')
     if (iand(batch%request, not(known)) /= 0) then
@@ -620,8 +615,8 @@ contains
     character(len=120) :: reason
     integer(c_int64_t) :: i
     integer :: c, m
-    logical :: are_finite, is_null, knows_step_time
-    call open_call(opaque, call_of_host, 0, instance, batch, knows_step_time, worst)
+    logical :: are_finite, is_null
+    call open_call(opaque, call_of_host, 0, instance, batch, worst)
     if (worst /= PILUM_OK) return
     m = instance%n_states
     is_null = .not. c_associated(batch%flux0%p)
@@ -671,8 +666,8 @@ contains
     real(c_double), pointer :: step_factors(:)
     integer(c_int64_t) :: i
     integer :: tangent, n, m, c, row
-    logical :: are_finite, is_null, knows_step_time
-    call open_call(opaque, call_of_host, KNOWN, instance, batch, knows_step_time, worst)
+    logical :: are_finite, is_null
+    call open_call(opaque, call_of_host, KNOWN, instance, batch, worst)
     if (worst /= PILUM_OK) return
     n = instance%n_components
     m = instance%n_states
@@ -713,8 +708,7 @@ contains
       end do
       point%time = batch%time
       point%time_increment = batch%time_increment
-      point%step_time = 0
-      if (knows_step_time) point%step_time = batch%step_time
+      point%step_time = batch%step_time
       call clear(point, end)
       if (are_finite) then
         status = PILUM_OK

@@ -33,7 +33,7 @@ typedef struct pilum_instance pilum_instance;
 /* Major version of the contract. Different majors never work together. */
 #define PILUM_ABI_MAJOR 1
 /* Minor version of the contract. Minors only append; any two of one major work together. */
-#define PILUM_ABI_MINOR 1
+#define PILUM_ABI_MINOR 0
 
 /* Outcome of a call, one of the `PILUM_OK` ... `PILUM_E_INTERNAL` values. */
 typedef int32_t pilum_status;
@@ -68,8 +68,7 @@ typedef int32_t pilum_hypothesis;
 #define PILUM_H_3D 3
 /* Interface in two dimensions, plane or axisymmetric: components normal, tangential. */
 #define PILUM_H_INTERFACE_2D 10
-/* Interface in three dimensions: components normal, tangential 1, tangential 2. No host of version
- * 1.0 uses it. */
+/* Interface in three dimensions: components normal, tangential 1, tangential 2. */
 #define PILUM_H_INTERFACE_3D 11
 
 /* Shape of a variable, one of the `PILUM_SCALAR` ... values. */
@@ -196,12 +195,12 @@ typedef struct pilum_formulation {
 /* Components are in axes of the material (1 along the layer, 2 normal to it, 3 out of plane), so
  * the law only makes sense in an element that has such axes. */
 #define PILUM_T_LOCAL_AXES (1u << 2)
-/* Offers rates, `PILUM_REQ_RATES`. Since 1.1. */
+/* Offers rates, `PILUM_REQ_RATES`. */
 #define PILUM_T_RATES (1u << 3)
-/* Its consistent tangent is close to the derivative of the update, but not equal to it. Since 1.1. */
+/* Its consistent tangent is close to the derivative of the update, but not equal to it. */
 #define PILUM_T_TANGENT_APPROXIMATE (1u << 4)
 /* Offers the elastic operator only; asked for the consistent tangent, it answers
- * `PILUM_E_UNSUPPORTED`. Since 1.1. */
+ * `PILUM_E_UNSUPPORTED`. */
 #define PILUM_T_NO_TANGENT (1u << 5)
 
 /* Read access to values of many points: component `c` of point `i` is
@@ -226,7 +225,7 @@ typedef struct pilum_view_mut {
 } pilum_view_mut;
 
 /* Rates of what an update depends on, and of what it gives: the derivative of the update in one
- * direction. Since 1.1. */
+ * direction. */
 typedef struct pilum_rates {
     /* Size of this struct. */
     uint32_t struct_size;
@@ -288,9 +287,9 @@ typedef struct pilum_batch {
     /* Size of the buffer in bytes. */
     size_t message_capacity;
     /* Time at the start of the increment, counted from the start of the phase or segment that it
-     * belongs to. Since 1.1. */
+     * belongs to. */
     double step_time;
-    /* Rates; null unless `PILUM_REQ_RATES` is set. Since 1.1. */
+    /* Rates; null unless `PILUM_REQ_RATES` is set. */
     const struct pilum_rates *rates;
 } pilum_batch;
 
@@ -300,7 +299,7 @@ typedef struct pilum_batch {
 #define PILUM_REQ_TANGENT (1u << 1)
 /* Compute the elastic operator instead of the consistent tangent. */
 #define PILUM_REQ_ELASTIC (1u << 2)
-/* Compute rates too, see `pilum_batch.rates`. Since 1.1. */
+/* Compute rates too, see `pilum_batch.rates`. */
 #define PILUM_REQ_RATES (1u << 3)
 
 /* What the host tells a library. */

@@ -293,7 +293,7 @@ template <class Law> struct Exported {
     /* Whether the law may be called; a message if not. */
     static bool is_sound(const Instance *instance, const pilum_batch *batch) noexcept {
         bool is_defective = instance && instance->is_defective;
-        if (is_defective && batch && PILUM_HAS(batch, pilum_batch, message_capacity)) {
+        if (is_defective && batch && PILUM_HAS(batch, pilum_batch, rates)) {
             pilum_say(batch->message, batch->message_capacity,
                       "the law threw before and is not called again");
         }

@@ -53,8 +53,7 @@ typedef struct pilum_point {
     double state[PILUM_MAX_STATES];
     /* Time at the start, and its increment. */
     double time, time_increment;
-    /* Time at the start, counted from the start of the phase or segment; 0 where the host is of
-     * version 1.0. */
+    /* Time at the start, counted from the start of the phase or segment. */
     double step_time;
 } pilum_point;
 
@@ -175,7 +174,7 @@ static inline pilum_status pilum_tell(const pilum_batch *batch, uint64_t i, pilu
 static inline pilum_status pilum_each_start(const pilum_instance *instance,
                                             const pilum_batch *batch, uint32_t n_components,
                                             uint32_t n_states, pilum_initial initial) {
-    if (!batch || !PILUM_HAS(batch, pilum_batch, message_capacity)) {
+    if (!batch || !PILUM_HAS(batch, pilum_batch, rates)) {
         return PILUM_E_ARGUMENT;
     }
     pilum_say(batch->message, batch->message_capacity, "%s", "");
@@ -239,7 +238,7 @@ static inline pilum_status pilum_each_point(const pilum_instance *instance,
                                             const pilum_batch *batch, uint32_t n_components,
                                             uint32_t n_states, pilum_update update) {
     const uint32_t known = PILUM_REQ_FLUX | PILUM_REQ_TANGENT | PILUM_REQ_ELASTIC;
-    if (!batch || !PILUM_HAS(batch, pilum_batch, message_capacity)) {
+    if (!batch || !PILUM_HAS(batch, pilum_batch, rates)) {
         return PILUM_E_ARGUMENT;
     }
     pilum_say(batch->message, batch->message_capacity, "%s", "");
@@ -282,7 +281,7 @@ static inline pilum_status pilum_each_point(const pilum_instance *instance,
         }
         point.time = batch->time;
         point.time_increment = batch->time_increment;
-        point.step_time = PILUM_HAS(batch, pilum_batch, step_time) ? batch->step_time : 0.0;
+        point.step_time = batch->step_time;
         if (!is_finite) {
             end.reason = "an input is not finite";
         }

@@ -10,7 +10,7 @@
 use crate::descriptor::{InternalVariables, Parameter};
 use crate::law::{Failure, Tangent};
 use crate::raw::{self, Batch, Rates, Status, View, ViewMut};
-use crate::version::{BATCH_SIZE_1_0, RATES_SIZE_1_1};
+use crate::version::{BATCH_SIZE_1_0, RATES_SIZE_1_0};
 use std::any::Any;
 use std::ffi::{CStr, c_char};
 use std::fmt::{self, Write};
@@ -289,13 +289,13 @@ pub(crate) unsafe fn known(batch: *const Batch) -> Option<Batch> {
     unsafe { known_part(batch, BATCH_SIZE_1_0) }
 }
 
-/// The rates as far as their writer knew them. `None`: null, or shorter than version 1.1.
+/// The rates as far as their writer knew them. `None`: null, or shorter than version 1.0.
 ///
 /// # Safety
 /// `rates` is null or as [`Rates`] promises, for as many bytes as its `struct_size` says.
 pub(crate) unsafe fn known_rates(rates: *const Rates) -> Option<Rates> {
     // SAFETY: passed on to the caller; all-zero is a valid `Rates`.
-    unsafe { known_part(rates, RATES_SIZE_1_1) }
+    unsafe { known_part(rates, RATES_SIZE_1_0) }
 }
 
 /// A struct as far as its writer knew it: the rule of growing structs in one place. `struct_size`

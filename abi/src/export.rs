@@ -327,7 +327,7 @@ unsafe fn run<L: Exported>(instance: *const Instance, batch: *const Batch, work:
     let rates = if batch.request & raw::PILUM_REQ_RATES == 0 {
         None
     } else {
-        // SAFETY: contract of `Batch::rates`: null or valid; null in a batch of version 1.0.
+        // SAFETY: contract of `Batch::rates`: null or valid.
         unsafe { known_rates(batch.rates) }
     };
     if let Err((status, why)) = check(&batch, rates.as_ref(), boxed, work) {

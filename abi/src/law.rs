@@ -96,8 +96,7 @@ pub struct SolidPoint<const N: usize, S> {
     pub time: f64,
     /// Time increment.
     pub time_increment: f64,
-    /// Time at the start, counted from the start of the phase or segment; 0 where the host is of
-    /// version 1.0.
+    /// Time at the start, counted from the start of the phase or segment.
     pub step_time: f64,
 }
 
@@ -131,8 +130,7 @@ pub struct InterfacePoint<S, T = f64, const N: usize = 2> {
     pub time: f64,
     /// Time increment.
     pub time_increment: f64,
-    /// Time at the start, counted from the start of the phase or segment; 0 where the host is of
-    /// version 1.0.
+    /// Time at the start, counted from the start of the phase or segment.
     pub step_time: f64,
 }
 

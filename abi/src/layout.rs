@@ -10,9 +10,8 @@ use std::ffi::CStr;
 use std::mem::size_of;
 
 /// Name of the symbol under which a Rust library exports [`RUST_LAYOUT`]. It carries the minor
-/// version: `abi_stable` takes types that have grown for others, so only equal minors are compared,
-/// and hosts of version 1.0 compare whatever stands under `pilum_rust_layout`.
-pub const SYMBOL: &str = "pilum_rust_layout_1_1";
+/// version: `abi_stable` takes types that have grown for others, so only equal minors are compared.
+pub const SYMBOL: &str = "pilum_rust_layout_1_0";
 
 /// Version of `abi_stable` whose description of layouts is used.
 pub const ABI_STABLE_VERSION: &CStr = c_str("0.11.3\0");

@@ -15,7 +15,7 @@ pub const PILUM_MAGIC: u32 = 0x5049_4C4D;
 /// Major version of the contract. Different majors never work together.
 pub const PILUM_ABI_MAJOR: u16 = 1;
 /// Minor version of the contract. Minors only append; any two of one major work together.
-pub const PILUM_ABI_MINOR: u16 = 1;
+pub const PILUM_ABI_MINOR: u16 = 0;
 
 /// Outcome of a call, one of the `PILUM_OK` … `PILUM_E_INTERNAL` values.
 pub type Status = i32;
@@ -48,8 +48,7 @@ pub const PILUM_H_AXISYMMETRIC: HypothesisCode = 2;
 pub const PILUM_H_3D: HypothesisCode = 3;
 /// Interface in two dimensions, plane or axisymmetric: components normal, tangential.
 pub const PILUM_H_INTERFACE_2D: HypothesisCode = 10;
-/// Interface in three dimensions: components normal, tangential 1, tangential 2. No host of version
-/// 1.0 uses it.
+/// Interface in three dimensions: components normal, tangential 1, tangential 2.
 pub const PILUM_H_INTERFACE_3D: HypothesisCode = 11;
 
 /// Shape of a variable, one of the `PILUM_SCALAR` … values.
@@ -184,12 +183,12 @@ pub const PILUM_T_LINEAR: u32 = 1 << 1;
 /// Components are in axes of the material (1 along the layer, 2 normal to it, 3 out of plane), so
 /// the law only makes sense in an element that has such axes.
 pub const PILUM_T_LOCAL_AXES: u32 = 1 << 2;
-/// Offers rates, [`PILUM_REQ_RATES`]. Since 1.1.
+/// Offers rates, [`PILUM_REQ_RATES`].
 pub const PILUM_T_RATES: u32 = 1 << 3;
-/// Its consistent tangent is close to the derivative of the update, but not equal to it. Since 1.1.
+/// Its consistent tangent is close to the derivative of the update, but not equal to it.
 pub const PILUM_T_TANGENT_APPROXIMATE: u32 = 1 << 4;
 /// Offers the elastic operator only; asked for the consistent tangent, it answers
-/// [`PILUM_E_UNSUPPORTED`]. Since 1.1.
+/// [`PILUM_E_UNSUPPORTED`].
 pub const PILUM_T_NO_TANGENT: u32 = 1 << 5;
 
 /// Read access to values of many points: component `c` of point `i` is
@@ -220,7 +219,7 @@ pub struct ViewMut {
 }
 
 /// Rates of what an update depends on, and of what it gives: the derivative of the update in one
-/// direction. Since 1.1.
+/// direction.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "abi_stable", derive(abi_stable::StableAbi))]
@@ -288,9 +287,9 @@ pub struct Batch {
     /// Size of the buffer in bytes.
     pub message_capacity: usize,
     /// Time at the start of the increment, counted from the start of the phase or segment that it
-    /// belongs to. Since 1.1.
+    /// belongs to.
     pub step_time: f64,
-    /// Rates; null unless [`PILUM_REQ_RATES`] is set. Since 1.1.
+    /// Rates; null unless [`PILUM_REQ_RATES`] is set.
     pub rates: *const Rates,
 }
 /// Compute fluxes and internal variables at the end of the increment.
@@ -299,7 +298,7 @@ pub const PILUM_REQ_FLUX: u32 = 1 << 0;
 pub const PILUM_REQ_TANGENT: u32 = 1 << 1;
 /// Compute the elastic operator instead of the consistent tangent.
 pub const PILUM_REQ_ELASTIC: u32 = 1 << 2;
-/// Compute rates too, see [`Batch::rates`]. Since 1.1.
+/// Compute rates too, see [`Batch::rates`].
 pub const PILUM_REQ_RATES: u32 = 1 << 3;
 
 /// What the host tells a library.

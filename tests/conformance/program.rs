@@ -161,6 +161,6 @@ impl Report {
 
 #[test]
 fn a_missing_compiler_is_named() {
-    let test = "good::a_library_of_a_later_minor_version_passes";
+    let test = "minors::a_library_of_a_later_minor_version_gives_the_same_bits";
     tests::needs::assert_named(test, "`cc`");
 }
