@@ -16,6 +16,7 @@ mod inclusion;
 mod mesh_error;
 mod methods;
 mod newton;
+mod nine_nodes;
 mod patch;
 mod patch_joint;
 mod patch_layer;

@@ -4,34 +4,33 @@
 //! Strains have components 11 22 33 12 with γ = 2ε₁₂, in axes of the element; jumps have normal
 //! and tangential components.
 //!
-//! # Adding a solid element
-//! 1. Here: its shape functions and Gauss points in `shape`, and a file that makes of them a
-//!    [`Solid`] (as `tri6` does); what is not a displacement element with Gauss points implements
-//!    [`Kinematics`] itself. `tests` shows patch tests, round-off of level ground, volumes.
-//! 2. [`Shape`](crate::mesh::Shape): its edges. The compiler then names every place that tells
-//!    shapes apart: the model's builder, which chooses points and strains for an
-//!    [`Integration`](crate::problem::Integration), and uniform refinement.
-//! 3. Outside: number and order of its nodes in Gmsh's files (`input::gmsh::kind`) and VTK's number of
-//!    the kind (`results::fields`).
+//! # Adding a kind of solid elements
+//! A file with its [`Kind`], as `quad9` is, and its name in [`Kind::ALL`]: mesh, refinement, recovery, thin layers,
+//! readers and writers of files take everything else from there. `tests` runs all kinds: patch test, level
+//! ground, volumes, division. Elements that are no displacement elements with Gauss points implement [`Kinematics`].
 //!
 //! An interface element in addition has the places where it is inserted (`mesh::insert`).
 
 mod joint6;
+pub(crate) mod kind;
 mod mixed;
 mod projection;
 mod quad8;
-mod shape;
+mod quad9;
+mod reference;
 mod solid;
 #[cfg(test)]
 mod tests;
 mod tri6;
 
 pub use joint6::Joint6;
+pub use kind::Kind;
 pub use mixed::Mixed;
-pub use quad8::Quad8;
-pub use shape::{gauss, line_shape};
-pub use solid::{BadShape, Solid, Strains};
-pub use tri6::Tri6;
+pub use quad8::QUAD8;
+pub use quad9::QUAD9;
+pub use reference::{gauss, line_shape};
+pub use solid::{BadShape, Strains};
+pub use tri6::TRI6;
 
 use crate::problem::Analysis;
 use std::ops::Range;

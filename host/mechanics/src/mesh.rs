@@ -5,80 +5,59 @@ mod refine;
 
 pub use insert::{Along, CannotInsert, Reason};
 
+use crate::element::{Kind, QUAD8, TRI6};
 use indexmap::IndexMap;
 
-/// What a solid element looks like.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Shape {
-    /// 6 nodes: corners counter-clockwise, then the mid-sides that follow them.
-    Triangle,
-    /// 8 nodes: corners counter-clockwise, then the mid-sides that follow them.
-    Quad,
-}
-
-/// Edges of a quad and of a triangle: first corner, second corner, mid-side, counter-clockwise.
-const QUAD: [[usize; 3]; 4] = [[0, 1, 4], [1, 2, 5], [2, 3, 6], [3, 0, 7]];
-const TRIANGLE: [[usize; 3]; 3] = [[0, 1, 3], [1, 2, 4], [2, 0, 5]];
-
-impl Shape {
-    /// Edges: first corner, second corner, mid-side, counter-clockwise.
-    pub const fn edges(self) -> &'static [[usize; 3]] {
-        match self {
-            Self::Triangle => &TRIANGLE,
-            Self::Quad => &QUAD,
-        }
-    }
-}
-
-/// A solid element: corners counter-clockwise, then the mid-sides that follow them.
+/// A solid element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Solid {
-    nodes: [usize; 8],
-    shape: Shape,
+    /// Those that the kind has not are zero.
+    nodes: [usize; Kind::MOST_NODES],
+    kind: &'static Kind,
     /// Number of its group.
     pub group: usize,
 }
 
 impl Solid {
-    /// An 8-node quad.
-    pub fn quad(nodes: [usize; 8], group: usize) -> Self {
+    /// An element of a kind. Of `nodes`, the first ones are taken, in the order of the kind.
+    pub fn new(kind: &'static Kind, nodes: &[usize], group: usize) -> Self {
+        let mut own = [0; Kind::MOST_NODES];
+        own[..kind.n_nodes()].copy_from_slice(&nodes[..kind.n_nodes()]);
         Self {
-            nodes,
-            shape: Shape::Quad,
+            nodes: own,
+            kind,
             group,
         }
+    }
+
+    /// An 8-node quad.
+    pub fn quad(nodes: [usize; 8], group: usize) -> Self {
+        Self::new(&QUAD8, &nodes, group)
     }
 
     /// A 6-node triangle.
     pub fn triangle(nodes: [usize; 6], group: usize) -> Self {
-        let mut all = [0; 8];
-        all[..6].copy_from_slice(&nodes);
-        Self {
-            nodes: all,
-            shape: Shape::Triangle,
-            group,
-        }
+        Self::new(&TRI6, &nodes, group)
     }
 
-    /// What it looks like.
-    pub fn shape(&self) -> Shape {
-        self.shape
+    /// Its kind.
+    pub fn kind(&self) -> &'static Kind {
+        self.kind
     }
 
     /// Number of corners.
     pub fn n_corners(&self) -> usize {
-        self.shape.edges().len()
+        self.kind.n_corners()
     }
 
-    /// Its nodes.
+    /// Its nodes: corners counter-clockwise, then the mid-sides that follow them, then those inside.
     pub fn nodes(&self) -> &[usize] {
-        &self.nodes[..2 * self.n_corners()]
+        &self.nodes[..self.kind.n_nodes()]
     }
 
     /// Its nodes, to be replaced by others at the same places.
     pub fn nodes_mut(&mut self) -> &mut [usize] {
-        let n = 2 * self.n_corners();
-        &mut self.nodes[..n]
+        &mut self.nodes[..self.kind.n_nodes()]
     }
 
     /// Its corners.
@@ -88,8 +67,18 @@ impl Solid {
 
     /// Nodes of its edges: first corner, second corner, mid-side, counter-clockwise.
     pub fn edges(&self) -> impl Iterator<Item = [usize; 3]> + use<'_> {
-        let edges = self.shape.edges().iter();
+        let edges = self.kind.edges.iter();
         edges.map(|edge| edge.map(|i| self.nodes[i]))
+    }
+
+    /// The same element with its nodes the other way round, from the same first corner.
+    #[must_use]
+    pub fn reversed(&self) -> Self {
+        let n = self.n_corners();
+        let mut reversed = *self;
+        reversed.nodes[1..n].reverse();
+        reversed.nodes[n..2 * n].reverse();
+        reversed
     }
 }
 
@@ -190,7 +179,7 @@ impl Mesh {
     /// Nodes of an edge: first end, second end, middle.
     pub fn edge(&self, (solid, edge): (usize, usize)) -> [usize; 3] {
         let solid = &self.solids[solid];
-        solid.shape.edges()[edge].map(|i| solid.nodes[i])
+        solid.kind.edges[edge].map(|i| solid.nodes[i])
     }
 
     /// Names a line after the edges that are chosen, of all elements in order.

@@ -2,10 +2,11 @@
 //! can be checked before the first increment.
 
 use crate::assembly::Tie;
-use crate::element::{Axes, BadShape, Joint6, Kinematics, Mixed, Quad8, Strains, Tri6};
+use crate::element::kind::{Elements, Points};
+use crate::element::{Axes, Joint6, Kinematics, Mixed};
 use crate::ground::InitialStresses;
 use crate::group::{Group, PointFailure};
-use crate::mesh::{Mesh, Shape, Solid};
+use crate::mesh::{Mesh, Solid};
 use crate::problem::{
     Analysis, Axis, Cause, ElementGroup, Formulation, InPlane, InitialStress, Integration, Item,
     Key, Material, Problem, Refusal, check, constraints, plausibility, sign_check,
@@ -311,25 +312,50 @@ impl GroupBuilder<'_> {
         own.map(|&number| &self.mesh.solids[number])
     }
 
-    /// The group's quads; a group of triangles is refused for this `cause`.
-    fn quads(&self, cause: fn(String) -> Cause) -> Result<Vec<[usize; 8]>, Refusal> {
-        let nodes = self.solids().map(|solid| solid.nodes().try_into().ok());
-        let nodes: Option<Vec<[usize; 8]>> = nodes.collect();
-        nodes.ok_or_else(|| self.refuse(cause(self.group.name.clone())))
-    }
-
     fn bad_shape(&self) -> Refusal {
         self.refuse(Cause::BadShape(self.group.name.clone()))
     }
 
-    /// Elements in global axes, in the order of the mesh: runs of one shape each, and of as many points.
+    /// Integration points of an element.
+    fn points(&self, solid: &Solid, integration: Integration) -> Result<Points, Refusal> {
+        let places: Vec<[f64; 2]> = solid.nodes().iter().map(|&n| self.mesh.nodes[n]).collect();
+        let points = (solid.kind().points)(integration, &places);
+        points.ok_or_else(|| {
+            let group = self.group.name.clone();
+            let cause = Cause::TooFewPoints(group, solid.kind().n_nodes());
+            self.refuse_key(Key::Integration, cause)
+        })
+    }
+
+    /// Elements in global axes, in the order of the mesh.
     fn solid(&self) -> Result<Box<dyn Kinematics>, Refusal> {
-        let solids: Vec<&Solid> = self.solids().collect();
-        let kind = |solid: &Solid| (solid.shape(), self.bent(solid));
-        let runs = solids.chunk_by(|a, b| kind(a) == kind(b));
-        let mut parts = runs
-            .map(|run| self.of_one_shape(run))
-            .collect::<Result<Vec<_>, _>>()?;
+        let integration = self.integration(Integration::Projected);
+        let element = |solid| Ok((solid, Axes::GLOBAL, self.points(solid, integration)?));
+        let elements: Vec<_> = self.solids().map(element).collect::<Result<_, _>>()?;
+        self.elements(&elements, |a, b| a == b)
+    }
+
+    /// Elements in the order of the mesh, each with its axes and points: runs of one kind each, in which
+    /// `are_alike` holds for the points of neighbours.
+    fn elements(
+        &self,
+        elements: &[(&Solid, Axes, Points)],
+        are_alike: fn(&Points, &Points) -> bool,
+    ) -> Result<Box<dyn Kinematics>, Refusal> {
+        let runs = elements
+            .chunk_by(|(a, _, of_a), (b, _, of_b)| a.kind() == b.kind() && are_alike(of_a, of_b));
+        let of_run = |run: &[(&Solid, Axes, Points)]| {
+            let nodes: Vec<&[usize]> = run.iter().map(|(solid, ..)| solid.nodes()).collect();
+            let own = Elements {
+                analysis: self.problem.analysis,
+                coordinates: &self.mesh.nodes,
+                nodes: &nodes,
+                axes: run.iter().map(|(_, axes, _)| *axes).collect(),
+                points: &|element| run[element].2,
+            };
+            (run[0].0.kind().build)(own).map_err(|_| self.bad_shape())
+        };
+        let mut parts = runs.map(of_run).collect::<Result<Vec<_>, _>>()?;
         Ok(if parts.len() == 1 {
             parts.remove(0)
         } else {
@@ -337,81 +363,43 @@ impl GroupBuilder<'_> {
         })
     }
 
-    /// Directions of a quad in which its sides are bent, so that it needs more points along them.
-    fn bent(&self, solid: &Solid) -> [bool; 2] {
-        let projected = self.integration(Integration::Projected) == Integration::Projected;
-        let nodes = solid.nodes().try_into().ok().filter(|_| projected);
-        nodes.map_or([false; 2], |nodes| Quad8::bent(&self.mesh.nodes, nodes))
-    }
-
-    /// Elements of one shape, at least one, in global axes.
-    fn of_one_shape(&self, solids: &[&Solid]) -> Result<Box<dyn Kinematics>, Refusal> {
-        let integration = self.integration(Integration::Projected);
-        let (analysis, coordinates) = (self.problem.analysis, &self.mesh.nodes);
-        let axes = vec![Axes::GLOBAL; solids.len()];
-        let elements: Result<Box<dyn Kinematics>, BadShape> = match solids[0].shape() {
-            Shape::Triangle => {
-                let (strains, n) = match integration {
-                    Integration::BBar => (Strains::LinearVolume, 6),
-                    Integration::Reduced => (Strains::AtPoints, 3),
-                    _ => (Strains::Projected, 3),
-                };
-                Tri6::new(analysis, coordinates, nodes(solids), axes, strains, n)
-                    .map(|elements| Box::new(elements) as _)
-            }
-            Shape::Quad => {
-                let bent = self.bent(solids[0]);
-                let [along_xi, along_eta] = bent.map(|bent| if bent { 3 } else { 2 });
-                let (strains, rule) = match integration {
-                    Integration::BBar => (Strains::LinearVolume, (3, 3)),
-                    Integration::Reduced => (Strains::AtPoints, (2, 2)),
-                    Integration::Projected if bent == [false; 2] => (Strains::Projected, (2, 2)),
-                    Integration::Projected => {
-                        (Strains::ProjectedLinearVolume, (along_xi, along_eta))
-                    }
-                    _ => (Strains::AtPoints, (3, 3)),
-                };
-                let rule = |_| rule;
-                Quad8::new(analysis, coordinates, nodes(solids), axes, strains, rule)
-                    .map(|elements| Box::new(elements) as _)
-            }
-        };
-        elements.map_err(|_| self.bad_shape())
-    }
-
     /// Elements in axes of the layer, and their thickness.
     fn thin_layer(&self, ties: &mut Ties) -> Result<(Box<dyn Kinematics>, Vec<f64>), Refusal> {
-        let nodes = self.quads(Cause::LayerOfTriangles)?;
-        let (mut axes, mut across, mut thickness) = (vec![], vec![], vec![]);
-        for nodes in &nodes {
-            let (direction, t) = self.across(nodes)?;
-            let at = |i: usize| self.mesh.nodes[nodes[i]];
-            // Ends of the mid-surface.
-            let (a, b) = match direction {
-                Across::Xi => (at(4), at(6)),
-                Across::Eta => (at(7), at(5)),
+        let solids: Vec<&Solid> = self.solids().collect();
+        if solids.iter().any(|solid| solid.n_corners() != 4) {
+            return Err(self.refuse(Cause::LayerOfTriangles(self.group.name.clone())));
+        }
+        let integration = self.integration(Integration::Full);
+        let (mut elements, mut thickness, mut middles) = (vec![], vec![], vec![]);
+        for solid in solids {
+            let (direction, t) = self.across(solid.nodes())?;
+            let at = |i: usize| self.mesh.nodes[solid.nodes()[i]];
+            // Ends of the mid-surface, and the points of the mean over the thickness.
+            let (across, [a, b], mean) = match direction {
+                Across::Xi => (0, [at(4), at(6)], Points::at(1, 3)),
+                Across::Eta => (1, [at(7), at(5)], Points::at(3, 1)),
             };
-            axes.push(Axes::of_facet([b[0] - a[0], b[1] - a[1]]));
-            across.push(direction);
+            let points = match integration {
+                Integration::Mean => mean,
+                _ => self.points(solid, integration)?,
+            };
+            let axes = Axes::of_facet([b[0] - a[0], b[1] - a[1]]);
+            elements.push((solid, axes, points));
             thickness.push(t);
+            middles.extend(
+                solid
+                    .kind()
+                    .between_faces(across)
+                    .into_iter()
+                    .map(|triple| triple.map(|i| solid.nodes()[i])),
+            );
         }
         self.refuse_normal_along()?;
-        let integration = self.integration(Integration::Full);
         if integration == Integration::Mean {
-            for (nodes, across) in nodes.iter().zip(&across) {
-                tie_middles(nodes, *across, ties);
-            }
+            tie_middles(&middles, ties);
         }
-        let rule = |element: usize| match (integration, across[element]) {
-            (Integration::Reduced, _) => (2, 2),
-            (Integration::Mean, Across::Xi) => (1, 3),
-            (Integration::Mean, Across::Eta) => (3, 1),
-            _ => (3, 3),
-        };
-        let (analysis, coordinates) = (self.problem.analysis, &self.mesh.nodes);
-        let strains = Strains::AtPoints;
-        let elements = Quad8::new(analysis, coordinates, nodes, axes, strains, rule);
-        Ok((Box::new(elements.map_err(|_| self.bad_shape())?), thickness))
+        let elements = self.elements(&elements, |_, _| true)?;
+        Ok((elements, thickness))
     }
 
     /// Refuses a `normal` in whose direction the layer is longer than along it: clearly so, since a
@@ -499,7 +487,7 @@ impl GroupBuilder<'_> {
     }
 
     /// The direction across a layer, and the thickness: the distance between its two faces.
-    fn across(&self, nodes: &[usize; 8]) -> Result<(Across, f64), Refusal> {
+    fn across(&self, nodes: &[usize]) -> Result<(Across, f64), Refusal> {
         let at = |i: usize| self.mesh.nodes[nodes[i]];
         let distance = |a: [f64; 2], b: [f64; 2]| (b[0] - a[0]).hypot(b[1] - a[1]);
         let (along_xi, along_eta) = (distance(at(7), at(5)), distance(at(4), at(6)));
@@ -579,23 +567,13 @@ impl GroupBuilder<'_> {
     }
 }
 
-/// Nodes of solids of one shape, which has `N`.
-fn nodes<const N: usize>(solids: &[&Solid]) -> Vec<[usize; N]> {
-    let nodes = solids.iter().map(|solid| solid.nodes().try_into());
-    nodes.flatten().collect()
-}
-
-/// Ties the two mid-thickness nodes of a quad to the corners on either side.
-fn tie_middles(nodes: &[usize; 8], across: Across, ties: &mut Ties) {
-    let middles = match across {
-        Across::Xi => [(4, 0, 1), (6, 3, 2)],
-        Across::Eta => [(7, 0, 3), (5, 1, 2)],
-    };
-    for (middle, a, b) in middles {
+/// Ties nodes in the middle of a layer's thickness (first) to those on its faces on either side.
+fn tie_middles(middles: &[[usize; 3]], ties: &mut Ties) {
+    for [middle, a, b] in middles {
         for c in 0..2 {
-            let dof = 2 * nodes[middle] + c;
+            let dof = 2 * middle + c;
             if ties.dofs.insert(dof) {
-                let masters = [(2 * nodes[a] + c, 0.5), (2 * nodes[b] + c, 0.5)];
+                let masters = [(2 * a + c, 0.5), (2 * b + c, 0.5)];
                 ties.ties.push(Tie { dof, masters });
             }
         }

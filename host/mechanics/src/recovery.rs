@@ -11,7 +11,8 @@
 
 mod fit;
 
-use crate::element::{Axes, BadShape, Kinematics, Quad8, Strains, Tri6};
+use crate::element::kind::Elements;
+use crate::element::{Axes, BadShape, Kind, Kinematics};
 use crate::problem::{Analysis, Formulation};
 use crate::simulation::Snapshot;
 use fit::Fit;
@@ -183,7 +184,7 @@ impl View<'_> {
         Ok(found)
     }
 
-    /// Elements in their order, by pieces of one shape.
+    /// Elements in their order, by pieces of one kind.
     fn pieces(&self) -> Vec<Range<usize>> {
         let mut pieces: Vec<Range<usize>> = Vec::new();
         for element in 0..self.kinematics.n_elements() {
@@ -198,36 +199,26 @@ impl View<'_> {
         pieces
     }
 
-    /// Strains of elements of one shape, by element.
+    /// Strains of elements of one kind, by element.
     fn strains(&self, piece: Range<usize>, points: Points) -> Result<Vec<Vec<Point>>, BadShape> {
-        let nodes = |element: usize| self.kinematics.nodes(element);
         let axes = vec![Axes::GLOBAL; piece.len()];
-        let (places, at_points) = (self.nodes, Strains::AtPoints);
-        let elements: Box<dyn Kinematics> = if nodes(piece.start).len() == 8 {
-            let own = piece.map(|element| std::array::from_fn(|i| nodes(element)[i]));
-            let n = match points {
-                Points::Best => 2,
-                Points::All => 3,
-            };
-            let rule = |_: usize| (n, n);
-            let own = own.collect();
-            Box::new(Quad8::new(
-                self.analysis,
-                places,
-                own,
-                axes,
-                at_points,
-                rule,
-            )?)
-        } else {
-            let own = piece.map(|element| std::array::from_fn(|i| nodes(element)[i]));
-            let n = match points {
-                Points::Best => 3,
-                Points::All => 7,
-            };
-            let own = own.collect();
-            Box::new(Tri6::new(self.analysis, places, own, axes, at_points, n)?)
+        let nodes: Vec<&[usize]> = piece
+            .map(|element| self.kinematics.nodes(element))
+            .collect();
+        let Some(kind) = Kind::with_nodes(nodes[0].len()) else {
+            return Err(BadShape { element: 0 });
         };
+        let points = match points {
+            Points::Best => kind.best,
+            Points::All => kind.fine,
+        };
+        let elements = (kind.build)(Elements {
+            analysis: self.analysis,
+            coordinates: self.nodes,
+            nodes: &nodes,
+            axes,
+            points: &|_| points,
+        })?;
         let mut strains = vec![0.0; 4 * elements.n_points()];
         elements.add_gradients(self.displacement, &mut strains);
         let point = |point: usize| Point {
@@ -268,7 +259,7 @@ impl Patches {
         let mut elements: Vec<Vec<usize>> = Vec::new();
         let mut corners = Vec::with_capacity(kinematics.n_elements());
         for element in 0..kinematics.n_elements() {
-            // Corners come first, and middles of sides are as many.
+            // Corners come first, then as many middles of sides, and at most one node more.
             let nodes = kinematics.nodes(element);
             let own = nodes[..nodes.len() / 2].iter().map(|&node| {
                 let number = *numbers.entry(node).or_insert_with(|| {

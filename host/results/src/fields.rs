@@ -5,6 +5,7 @@ use crate::output_request::{Output, When};
 use crate::pressures::Pressure;
 use crate::table::{push_count, push_shortest};
 use mechanics::Simulation;
+use mechanics::element::Kind;
 use mechanics::problem::Formulation;
 use mechanics::recovery::MeshError;
 use mechanics::simulation::Snapshot;
@@ -14,14 +15,12 @@ use std::path::{Path, PathBuf};
 use text::Error;
 use text::write::replace;
 
-/// Kinds of cells in the files: the number of their nodes, and VTK's number of the kind. Quadratic edges
-/// (elements without thickness), triangles and quads.
-pub(crate) const CELLS: [(usize, u8); 3] = [(3, 21), (6, 22), (8, 23)];
-
-/// VTK's number of the kind of cell with this many nodes.
-fn cell_type(n_nodes: usize) -> Option<u8> {
-    let (_, vtk) = CELLS.iter().find(|(n, _)| *n == n_nodes)?;
-    Some(*vtk)
+/// VTK's number of the kind of cell with this many nodes: quadratic edges (elements without thickness) or solids.
+pub(crate) fn cell_type(n_nodes: usize) -> Option<u8> {
+    if n_nodes == 3 {
+        return Some(21);
+    }
+    Kind::with_nodes(n_nodes).map(|kind| kind.vtk)
 }
 
 /// Fields at the times asked for.

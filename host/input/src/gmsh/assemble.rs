@@ -5,13 +5,14 @@ use super::contents::{Contents, Element};
 use super::cursor::Fault;
 use super::kind::{Kind, MOST_NODES};
 use indexmap::IndexMap;
+use mechanics::element;
 use mechanics::mesh::{Line, Mesh, Solid};
 use mechanics::problem::Analysis;
 use std::collections::{HashMap, HashSet};
 
 /// Nodes of a mesh, and their numbers by those of the file.
 type Numbered = (Vec<[f64; 2]>, HashMap<usize, usize>);
-/// Nodes of an element of the file, by their place in it: first those that the mesh takes.
+/// Nodes of an element of the file, by their place in it.
 type Nodes = [usize; MOST_NODES];
 /// Ends of a side, the smaller one first.
 type Ends = [usize; 2];
@@ -51,7 +52,7 @@ struct Assembly<'a> {
     taken: Vec<(&'a Element, Nodes, usize)>,
     /// Ends of the sides that get a node in their middle; such nodes are counted on from those of the file.
     put_in: Vec<Ends>,
-    /// Whether a node of the file belongs to an element that leaves it out, or that the case leaves out.
+    /// Whether a node of the file belongs to an element that the case leaves out.
     is_outside: Vec<bool>,
     /// Sides of elements that the case leaves out.
     outside: HashSet<Ends>,
@@ -83,8 +84,9 @@ pub(super) fn assemble(contents: &Contents<'_>, wanted: &Wanted<'_>) -> Result<A
     };
     for (element, nodes, group) in &assembly.taken {
         let nodes = nodes.map(|node| number.get(&node).copied().unwrap_or_default());
-        let solid = turned(element.kind, &mesh.nodes, nodes, *group);
-        mesh.solids.push(solid);
+        let kind = element.kind.solid();
+        let solid = kind.map(|kind| turned(kind, &mesh.nodes, nodes, *group));
+        mesh.solids.extend(solid);
     }
     let sides = assembly.sides(&mesh)?;
     assembly.lines(&mut mesh, &number, &sides)?;
@@ -214,13 +216,6 @@ impl Assembly<'_> {
         let n_of_file = self.contents.nodes.len();
         let is_first = |element: &Element| element.kind.is_first_order();
         let taken = self.taken.iter().map(|(element, ..)| element.kind);
-        let n_nine = taken.clone().filter(|kind| *kind == Kind::Quad9).count();
-        if n_nine > 0 {
-            self.notes.push(format!(
-                "{} of 9 nodes: the one in the middle is left out",
-                counted(n_nine, "quad", " is", "s are")
-            ));
-        }
         let n_first = taken.filter(|kind| kind.is_first_order()).count();
         if n_first == 0 {
             return;
@@ -250,12 +245,8 @@ impl Assembly<'_> {
         let (contents, wanted) = (self.contents, self.wanted);
         let mut is_used = vec![false; contents.nodes.len()];
         for (element, nodes, _) in &self.taken {
-            let (own, rest) = nodes.split_at(element.kind.n_taken());
-            for node in own {
+            for node in &nodes[..element.kind.n_nodes()] {
                 is_used[*node] = true;
-            }
-            if element.kind == Kind::Quad9 {
-                self.is_outside[rest[0]] = true;
             }
         }
         let used = || {
@@ -535,7 +526,7 @@ fn ends_of(a: usize, b: usize) -> Ends {
 
 /// Sides of a triangle or quad: their ends, and where its nodes have the middle.
 fn sides(kind: Kind, nodes: &Nodes) -> impl Iterator<Item = (Ends, usize)> + use<'_> {
-    let n = kind.n_corners();
+    let n = kind.solid().map_or(0, |solid| solid.n_corners());
     (0..n).map(move |side| (ends_of(nodes[side], nodes[(side + 1) % n]), n + side))
 }
 
@@ -547,20 +538,13 @@ fn middles(sides: &[Option<Side>]) -> HashMap<Ends, usize> {
 }
 
 /// An element of the mesh, its nodes counter-clockwise.
-fn turned(kind: Kind, at: &[[f64; 2]], nodes: Nodes, group: usize) -> Solid {
-    let [a, b, c, d, e, f, g, h, _] = nodes;
-    if kind.n_corners() == 3 {
-        let solid = Solid::triangle([a, b, c, d, e, f], group);
-        if area(at, &solid) < 0.0 {
-            return Solid::triangle([a, c, b, f, e, d], group);
-        }
-        return solid;
-    }
-    let solid = Solid::quad([a, b, c, d, e, f, g, h], group);
+fn turned(kind: &'static element::Kind, at: &[[f64; 2]], nodes: Nodes, group: usize) -> Solid {
+    let solid = Solid::new(kind, &nodes, group);
     if area(at, &solid) < 0.0 {
-        return Solid::quad([a, d, c, b, h, g, f, e], group);
+        solid.reversed()
+    } else {
+        solid
     }
-    solid
 }
 
 /// Area of an element, negative if it goes round clockwise.

@@ -1,5 +1,7 @@
 //! Types of elements in Gmsh's numbering.
 
+use mechanics::element::{Kind as Solid, QUAD8, TRI6};
+
 /// An element that a mesh may have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
@@ -8,16 +10,14 @@ pub(super) enum Kind {
     Line2,
     /// Two ends and the middle.
     Line3,
-    Triangle3,
-    Triangle6,
-    Quad4,
-    Quad8,
-    /// Corners, middles of the sides, and the middle of it all, which the mesh leaves out.
-    Quad9,
+    /// The corners of such a solid element.
+    Corners(&'static Solid),
+    /// All its nodes.
+    Solid(&'static Solid),
 }
 
 /// Most nodes of an element in a file.
-pub(super) const MOST_NODES: usize = 9;
+pub(super) const MOST_NODES: usize = Solid::MOST_NODES;
 
 impl Kind {
     /// The type with this number.
@@ -25,15 +25,15 @@ impl Kind {
     /// # Errors
     /// The name of another kind, and the kinds that are read.
     pub(super) fn of(number: i64) -> Result<Self, String> {
+        if let Some(solid) = Solid::ALL.into_iter().find(|kind| kind.gmsh == number) {
+            return Ok(Self::Solid(solid));
+        }
         let name = match number {
             15 => return Ok(Self::Point),
             1 => return Ok(Self::Line2),
             8 => return Ok(Self::Line3),
-            2 => return Ok(Self::Triangle3),
-            9 => return Ok(Self::Triangle6),
-            3 => return Ok(Self::Quad4),
-            16 => return Ok(Self::Quad8),
-            10 => return Ok(Self::Quad9),
+            2 => return Ok(Self::Corners(&TRI6)),
+            3 => return Ok(Self::Corners(&QUAD8)),
             4 | 11 | 29 | 30 | 31 | 71..=75 | 79..=83 | 137 => "a tetrahedron",
             5 | 12 | 17 | 92..=98 | 99..=105 => "a hexahedron",
             6 | 13 | 18 | 90 | 91 | 106..=117 => "a prism",
@@ -54,33 +54,23 @@ impl Kind {
         match self {
             Self::Point => 1,
             Self::Line2 => 2,
-            Self::Line3 | Self::Triangle3 => 3,
-            Self::Quad4 => 4,
-            Self::Triangle6 => 6,
-            Self::Quad8 => 8,
-            Self::Quad9 => 9,
+            Self::Line3 => 3,
+            Self::Corners(solid) => solid.n_corners(),
+            Self::Solid(solid) => solid.n_nodes(),
         }
     }
 
-    /// Number of those nodes that the mesh takes, the first ones.
-    pub(super) fn n_taken(self) -> usize {
+    /// The solid element that it becomes.
+    pub(super) fn solid(self) -> Option<&'static Solid> {
         match self {
-            Self::Quad9 => 8,
-            _ => self.n_nodes(),
-        }
-    }
-
-    /// Number of corners of a triangle or quad.
-    pub(super) fn n_corners(self) -> usize {
-        match self {
-            Self::Triangle3 | Self::Triangle6 => 3,
-            _ => 4,
+            Self::Corners(solid) | Self::Solid(solid) => Some(solid),
+            _ => None,
         }
     }
 
     /// Whether its sides have no nodes in their middles.
     pub(super) fn is_first_order(self) -> bool {
-        matches!(self, Self::Line2 | Self::Triangle3 | Self::Quad4)
+        matches!(self, Self::Line2 | Self::Corners(_))
     }
 
     /// 0 of a point, 1 of a line, 2 of a triangle or quad.
@@ -88,7 +78,7 @@ impl Kind {
         match self {
             Self::Point => 0,
             Self::Line2 | Self::Line3 => 1,
-            _ => 2,
+            Self::Corners(_) | Self::Solid(_) => 2,
         }
     }
 }

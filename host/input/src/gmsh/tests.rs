@@ -3,7 +3,7 @@
 use super::*;
 use crate::Case;
 use crate::mesh::{Built, build};
-use mechanics::mesh::Shape;
+use mechanics::element::{QUAD8, TRI6};
 use std::fmt::Write as _;
 
 #[path = "tests/first_order.rs"]
@@ -338,10 +338,10 @@ fn all_formats_give_the_same_mesh() {
     }
     let (mesh, notes) = &meshes[0];
     assert_eq!(mesh.nodes.len(), 14);
-    let shapes: Vec<_> = mesh.solids.iter().map(|s| (s.shape(), s.group)).collect();
+    let shapes: Vec<_> = mesh.solids.iter().map(|s| (s.kind(), s.group)).collect();
     assert_eq!(
         shapes,
-        [(Shape::Quad, 0), (Shape::Triangle, 1), (Shape::Triangle, 1)]
+        [(&QUAD8, 0), (&TRI6, 1), (&TRI6, 1)]
     );
     // The one that was inside out, turned.
     assert_eq!(mesh.solids[2].nodes(), [1, 5, 2, 13, 12, 7]);

@@ -1,6 +1,6 @@
 //! Zero-thickness elements of three double nodes.
 
-use super::shape::{gauss, line_shape};
+use super::reference::{gauss, line_shape};
 use super::{Axes, Kinematics, Traction, depth};
 use crate::mesh::Joint;
 use crate::problem::{Analysis, Integration};

@@ -4,7 +4,8 @@
     reason = "only what is inlined is compiled for the processor's own vector instructions"
 )]
 
-use super::shape::{Functions, Reference, RulePoint};
+use super::kind::{Elements, Points};
+use super::reference::{Functions, Reference, RulePoint};
 use super::{Axes, Kinematics, depth, projection};
 use crate::problem::Analysis;
 use algebra::threads;
@@ -20,7 +21,7 @@ const MOST_POINTS: usize = 9;
 
 /// Elements of N nodes of one group.
 #[derive(Debug)]
-pub struct Solid<const N: usize> {
+pub(super) struct Solid<const N: usize> {
     nodes: Vec<[usize; N]>,
     axes: Vec<Axes>,
     lengths: Vec<f64>,
@@ -44,17 +45,6 @@ pub(super) struct Point<const N: usize> {
     pub(super) h: [f64; N],
     pub(super) weight: f64,
     pub(super) position: [f64; 2],
-}
-
-/// Integration points of the law, and the strains there.
-#[derive(Clone, Debug)]
-pub(super) struct Rule {
-    /// Points of the law.
-    pub(super) points: Vec<RulePoint>,
-    /// How many of them there are along ξ and along η.
-    pub(super) along: [usize; 2],
-    /// What becomes of the strains.
-    pub(super) strains: Strains,
 }
 
 /// What becomes of an element's strains.
@@ -86,26 +76,32 @@ struct Geometry<const N: usize> {
 }
 
 impl<const N: usize> Solid<N> {
-    /// Elements with the integration points of a rule, in the given axes. `rule` gives the points
-    /// of an element, of all as many and with the same strains.
+    /// Elements that are described by a reference.
     ///
     /// # Errors
     /// An element whose Jacobian is not positive.
     pub(super) fn of_reference(
         reference: &Reference<N>,
-        analysis: Analysis,
-        coordinates: &[[f64; 2]],
-        nodes: Vec<[usize; N]>,
-        axes: Vec<Axes>,
-        rule: impl Fn(usize) -> Rule + Sync,
+        elements: Elements<'_>,
     ) -> Result<Self, BadShape> {
-        let first = (!nodes.is_empty()).then(|| rule(0));
-        let points_per_element = first.as_ref().map_or(0, |first| first.points.len());
+        let Elements {
+            analysis,
+            coordinates,
+            nodes,
+            axes,
+            points,
+        } = elements;
+        let nodes: Vec<[usize; N]> = nodes
+            .iter()
+            .map(|nodes| std::array::from_fn(|i| nodes[i]))
+            .collect();
+        let first = (!nodes.is_empty()).then(|| points(0));
+        let points_per_element = first.map_or(0, |first| (reference.rule)(first.along).len());
         let strains = first.map(|first| first.strains);
         let geometry = |element: usize| -> Result<Geometry<N>, BadShape> {
             let places = nodes[element].map(|n| coordinates[n]);
-            let geometry =
-                Geometry::new(reference, analysis, &places, &axes[element], rule(element));
+            let (axes, points) = (&axes[element], points(element));
+            let geometry = Geometry::new(reference, analysis, &places, axes, points);
             geometry.ok_or(BadShape { element })
         };
         let elements: Vec<usize> = (0..nodes.len()).collect();
@@ -156,12 +152,9 @@ impl<const N: usize> Geometry<N> {
         analysis: Analysis,
         places: &[[f64; 2]; N],
         axes: &Axes,
-        Rule {
-            points: rule,
-            along,
-            strains,
-        }: Rule,
+        Points { along, strains }: Points,
     ) -> Option<Self> {
+        let rule = (reference.rule)(along);
         let at = |points: &[RulePoint]| -> Option<Vec<Point<N>>> {
             let point = |&RulePoint { at, weights }: &RulePoint| {
                 let shape = (reference.shape)(at);
@@ -189,11 +182,12 @@ impl<const N: usize> Geometry<N> {
         match strains {
             Strains::AtPoints | Strains::LinearVolume => {}
             _ if curved => {
+                let functions = reference.functions.as_ref()?;
                 let basis = |rule: &[RulePoint], points: &[Point<N>]| -> Vec<Vec<f64>> {
                     let both = rule.iter().zip(points);
                     both.map(|(at, point)| {
                         let linear = [1.0, point.position[0], point.position[1]];
-                        let beyond = (reference.beyond_linear)(along, at.at);
+                        let beyond = (functions.beyond_linear)(along, at.at);
                         linear.into_iter().chain(beyond).collect()
                     })
                     .collect()
@@ -203,7 +197,8 @@ impl<const N: usize> Geometry<N> {
                 projection::project(&mut own, &fine, |q, fine| values[fine][q])?;
             }
             _ => {
-                let of_point = |q: usize, at: [f64; 2]| (reference.function)(rule[q].at, at);
+                let functions = reference.functions.as_ref()?;
+                let of_point = |q: usize, at: [f64; 2]| (functions.function)(rule[q].at, at);
                 let value = |q: usize, fine: usize| of_point(q, exact[fine].at);
                 projection::project(&mut own, &fine, value)?;
             }

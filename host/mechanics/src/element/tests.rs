@@ -1,3 +1,5 @@
+use super::kind::{Elements, Points};
+use super::reference::Reference;
 use super::*;
 use approx::assert_relative_eq;
 use nalgebra::{DMatrix, DVector};
@@ -65,6 +67,25 @@ fn with_middles<const C: usize, const N: usize>(
     elements.iter().map(&mut with_middles).collect()
 }
 
+/// Elements of a kind, all with these axes and points.
+fn build<N: AsRef<[usize]>>(
+    kind: &Kind,
+    analysis: Analysis,
+    coordinates: &[[f64; 2]],
+    nodes: &[N],
+    axes: Axes,
+    points: Points,
+) -> Result<Box<dyn Kinematics>, BadShape> {
+    let nodes: Vec<&[usize]> = nodes.iter().map(AsRef::as_ref).collect();
+    (kind.build)(Elements {
+        analysis,
+        coordinates,
+        axes: vec![axes; nodes.len()],
+        nodes: &nodes,
+        points: &|_| points,
+    })
+}
+
 /// The rectangle from (1, 0) to (3, 2) in elements around a corner that lies off its centre.
 struct Patch {
     coordinates: Vec<[f64; 2]>,
@@ -73,7 +94,7 @@ struct Patch {
 
 const CENTRE: [f64; 2] = [1.8, 1.3];
 
-fn patch_of_quads(analysis: Analysis, axes: Axes, rule: (usize, usize)) -> Patch {
+fn patch_of_quads(kind: &Kind, analysis: Analysis, axes: Axes, rule: (usize, usize)) -> Patch {
     let mut coordinates = vec![
         [1.0, 0.0],
         [2.2, 0.0],
@@ -86,44 +107,41 @@ fn patch_of_quads(analysis: Analysis, axes: Axes, rule: (usize, usize)) -> Patch
         [3.0, 2.0],
     ];
     let corners = [[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]];
-    let nodes = with_middles(&mut coordinates, &corners);
-    let elements = Quad8::new(
-        analysis,
-        &coordinates,
-        nodes,
-        vec![axes; 4],
-        Strains::AtPoints,
-        |_| rule,
-    );
+    let nodes: Vec<[usize; 8]> = with_middles(&mut coordinates, &corners);
+    let mut nodes: Vec<Vec<usize>> = nodes.iter().map(|nodes| nodes.to_vec()).collect();
+    if kind == &QUAD9 {
+        for own in &mut nodes {
+            let middle = [0, 1].map(|c| own[..4].iter().map(|&n| 0.25 * coordinates[n][c]).sum());
+            own.push(coordinates.len());
+            coordinates.push(middle);
+        }
+    }
+    let points = Points::at(rule.0, rule.1);
+    let elements = build(kind, analysis, &coordinates, &nodes, axes, points).unwrap();
     Patch {
-        elements: Box::new(elements.unwrap()),
         coordinates,
+        elements,
     }
 }
 
 fn patch_of_triangles(analysis: Analysis, axes: Axes, n_points: usize) -> Patch {
     let mut coordinates = vec![[1.0, 0.0], [3.0, 0.0], [3.0, 2.0], [1.0, 2.0], CENTRE];
     let corners = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]];
-    let nodes = with_middles(&mut coordinates, &corners);
-    let elements = Tri6::new(
-        analysis,
-        &coordinates,
-        nodes,
-        vec![axes; 4],
-        Strains::AtPoints,
-        n_points,
-    );
+    let nodes: Vec<[usize; 6]> = with_middles(&mut coordinates, &corners);
+    let points = Points::at(n_points, 1);
+    let elements = build(&TRI6, analysis, &coordinates, &nodes, axes, points).unwrap();
     Patch {
-        elements: Box::new(elements.unwrap()),
         coordinates,
+        elements,
     }
 }
 
 /// Patches of all elements and rules.
 fn patches(analysis: Analysis, axes: Axes) -> Vec<Patch> {
-    let quads = [(2, 2), (3, 3)].map(|rule| patch_of_quads(analysis, axes, rule));
+    let quads = [(2, 2), (3, 3)].map(|rule| patch_of_quads(&QUAD8, analysis, axes, rule));
+    let nine = patch_of_quads(&QUAD9, analysis, axes, (3, 3));
     let triangles = [3, 6, 7].map(|n| patch_of_triangles(analysis, axes, n));
-    quads.into_iter().chain(triangles).collect()
+    quads.into_iter().chain([nine]).chain(triangles).collect()
 }
 
 impl Patch {
@@ -312,15 +330,15 @@ fn elements_turned_inside_out_are_refused() {
         [0.5, 0.5],
         [0.0, 0.5],
     ];
-    let new = |nodes| {
-        let axes = vec![Axes::GLOBAL];
-        Tri6::new(
-            Analysis::PlaneStrain,
+    let new = |nodes: [usize; 6]| {
+        let (analysis, points) = (Analysis::PlaneStrain, Points::at(3, 1));
+        build(
+            &TRI6,
+            analysis,
             &coordinates,
-            vec![nodes],
-            axes,
-            Strains::AtPoints,
-            3,
+            &[nodes],
+            Axes::GLOBAL,
+            points,
         )
     };
     assert!(new([0, 1, 2, 3, 4, 5]).is_ok());
@@ -343,18 +361,10 @@ fn curved_triangles_have_the_area_of_a_disc() {
             let first = coordinates.len();
             let halved = |p: [f64; 2]| p.map(|x| 0.5 * x);
             coordinates.extend([[0.0; 2], a, b, halved(a), middle, halved(b)]);
-            nodes.push(std::array::from_fn(|i| first + i));
+            nodes.push(std::array::from_fn::<usize, 6, _>(|i| first + i));
         }
-        let axes = vec![Axes::GLOBAL; n];
-        let disc = Tri6::new(
-            Analysis::PlaneStrain,
-            &coordinates,
-            nodes,
-            axes,
-            Strains::AtPoints,
-            3,
-        )
-        .unwrap();
+        let (analysis, points) = (Analysis::PlaneStrain, Points::at(3, 1));
+        let disc = build(&TRI6, analysis, &coordinates, &nodes, Axes::GLOBAL, points).unwrap();
         let weights = (0..disc.n_points()).map(|point| disc.weight(point));
         // Triangle and parabola.
         let (s, c) = (0.5 * angle).sin_cos();
@@ -465,11 +475,18 @@ fn bent_quads_carry_a_linear_stress() {
     ] {
         let coordinates = bowed(bows);
         let nodes = [0, 1, 2, 3, 4, 5, 6, 7];
-        assert_eq!(Quad8::bent(&coordinates, nodes), [n.0 == 3, n.1 == 3]);
+        assert_eq!(quad8::bent(&coordinates), [n.0 == 3, n.1 == 3]);
         for analysis in ANALYSES {
-            let forces = |strains, rule| {
-                let axes = vec![Axes::GLOBAL];
-                let quad = Quad8::new(analysis, &coordinates, vec![nodes], axes, strains, |_| rule);
+            let forces = |strains, along| {
+                let points = Points { along, strains };
+                let quad = build(
+                    &QUAD8,
+                    analysis,
+                    &coordinates,
+                    &[nodes],
+                    Axes::GLOBAL,
+                    points,
+                );
                 let quad = quad.unwrap();
                 let stress = |point| {
                     let [x, y] = quad.position(point);
@@ -486,17 +503,14 @@ fn bent_quads_carry_a_linear_stress() {
                 quad.add_forces(&stress, &mut force);
                 force
             };
-            let exact = forces(Strains::AtPoints, (4, 4));
-            let found = forces(Strains::ProjectedLinearVolume, n);
+            let exact = forces(Strains::AtPoints, [4, 4]);
+            let found = forces(Strains::ProjectedLinearVolume, [n.0, n.1]);
             for (found, exact) in found.iter().zip(&exact) {
                 assert_relative_eq!(found, exact, epsilon = 1e-11);
             }
         }
     }
-    assert_eq!(
-        Quad8::bent(&bowed([0.009, -0.009]), [0, 1, 2, 3, 4, 5, 6, 7]),
-        [false; 2]
-    );
+    assert_eq!(quad8::bent(&bowed([0.009, -0.009])), [false; 2]);
 }
 
 /// Nodes do not integrate N t r where all three grow along a side, nor anything on a curve; where the radius is the
@@ -560,4 +574,108 @@ fn tractions_that_are_gathered_at_nodes_have_exact_nodal_forces() {
         let across = nodal.axes_at(point).across;
         assert_relative_eq!(x * across[0] + y * across[1], 1.0, epsilon = 1e-14);
     }
+}
+
+/// Shape functions are one at their nodes and zero at the others, sum up to one, and have the derivatives of
+/// differences; so the map takes the middle of every edge to the middle node.
+fn check_shape<const N: usize>(kind: &Kind, reference: &Reference<N>, at: [f64; 2]) {
+    let (n, d) = (reference.shape)(at);
+    assert_relative_eq!(n.iter().sum::<f64>(), 1.0, epsilon = 1e-15);
+    for derivative in d {
+        assert_relative_eq!(derivative.iter().sum::<f64>(), 0.0, epsilon = 1e-15);
+    }
+    assert_eq!(kind.n_nodes(), N);
+    for (i, node) in kind.places.iter().enumerate() {
+        let (n, _) = (reference.shape)(*node);
+        for (j, n) in n.into_iter().enumerate() {
+            assert_relative_eq!(n, f64::from(u8::from(i == j)), epsilon = 1e-15);
+        }
+    }
+    for [a, b, middle] in kind.edges {
+        let [a, b, middle] = [a, b, middle].map(|node| kind.places[*node]);
+        assert_eq!([0, 1].map(|c| f64::midpoint(a[c], b[c])), middle);
+    }
+    let h = 1e-6;
+    for axis in 0..2 {
+        let moved = |by: f64| {
+            let mut there = at;
+            there[axis] += by;
+            (reference.shape)(there).0
+        };
+        let (ahead, behind) = (moved(h), moved(-h));
+        for i in 0..N {
+            let difference = (ahead[i] - behind[i]) / (2.0 * h);
+            assert_relative_eq!(d[axis][i], difference, epsilon = 1e-9);
+        }
+    }
+}
+
+#[test]
+fn shape_functions_sum_to_one_and_derivatives_agree_with_differences() {
+    check_shape(&TRI6, &tri6::REFERENCE, [0.3, 0.15]);
+    check_shape(&QUAD8, &quad8::REFERENCE, [0.3, -0.7]);
+    check_shape(&QUAD9, &quad9::REFERENCE, [0.3, -0.7]);
+    assert_eq!(Kind::ALL.map(Kind::n_nodes), [6, 8, 9]);
+}
+
+/// The four parts of an element, mapped as its nodes say, cover it: a part's node lies where the map of the whole
+/// takes it.
+fn check_division<const N: usize>(kind: &Kind, reference: &Reference<N>) {
+    let bowed = |[x, y]: [f64; 2]| [x + 0.1 * x * y - 0.05 * y * y, y + 0.07 * x * x];
+    let nodes: Vec<[f64; 2]> = kind.places.iter().map(|&at| bowed(at)).collect();
+    let map = |at: [f64; 2]| {
+        let (n, _) = (reference.shape)(at);
+        [0, 1].map(|c| (0..N).map(|i| n[i] * nodes[i][c]).sum::<f64>())
+    };
+    let mut mesh = crate::mesh::Mesh {
+        nodes: nodes.clone(),
+        ..Default::default()
+    };
+    let numbers: Vec<usize> = (0..N).collect();
+    let kind = Kind::with_nodes(kind.n_nodes()).unwrap();
+    mesh.solids.push(crate::mesh::Solid::new(kind, &numbers, 0));
+    let fine = mesh.refined();
+    assert_eq!(fine.solids.len(), 4);
+    let middle = |a: [f64; 2], b: [f64; 2]| [0, 1].map(|c| f64::midpoint(a[c], b[c]));
+    for (k, part) in fine.solids.iter().enumerate() {
+        // Corners of the part in the coordinates of the whole.
+        let n = kind.n_corners();
+        let corner = |j: usize| {
+            let at = |i: usize| kind.places[i];
+            match (k < n, j) {
+                (true, 0) => at(k),
+                (true, 1) => at(n + k),
+                (true, _) if j == n - 1 => at(n + (k + n - 1) % n),
+                (true, _) => [0.0, 0.0],
+                (false, _) => at(n + j),
+            }
+        };
+        for (i, &node) in part.nodes().iter().enumerate() {
+            let at = match kind.edges.iter().find(|edge| edge[2] == i) {
+                None if i < n => corner(i),
+                Some([a, b, _]) => middle(corner(*a), corner(*b)),
+                None => middle(corner(0), corner(2)),
+            };
+            let expected = map(at);
+            for c in 0..2 {
+                assert_relative_eq!(fine.nodes[node][c], expected[c], epsilon = 1e-14);
+            }
+        }
+    }
+}
+
+#[test]
+fn an_element_is_divided_on_its_own_map() {
+    check_division(&TRI6, &tri6::REFERENCE);
+    check_division(&QUAD8, &quad8::REFERENCE);
+    check_division(&QUAD9, &quad9::REFERENCE);
+}
+
+/// Nodes in the middle of a layer, with those on its faces.
+#[test]
+fn nodes_between_faces() {
+    assert_eq!(QUAD8.between_faces(0), [[4, 0, 1], [6, 3, 2]]);
+    assert_eq!(QUAD8.between_faces(1), [[7, 0, 3], [5, 1, 2]]);
+    assert_eq!(QUAD9.between_faces(0), [[4, 0, 1], [8, 7, 5], [6, 3, 2]]);
+    assert_eq!(QUAD9.between_faces(1), [[7, 0, 3], [8, 4, 6], [5, 1, 2]]);
 }

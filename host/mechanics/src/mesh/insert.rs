@@ -14,7 +14,7 @@ use std::fmt;
 
 /// Position of an edge with this middle node among the nodes of an element.
 fn edge_at(element: &Solid, middle: usize) -> Option<[usize; 3]> {
-    let (nodes, edges) = (element.nodes(), element.shape().edges().iter());
+    let (nodes, edges) = (element.nodes(), element.kind().edges.iter());
     edges.copied().find(|&[_, _, at]| nodes[at] == middle)
 }
 

@@ -3,7 +3,8 @@
 //! New nodes lie on the element's own map, which takes the quadratic parts of an element onto
 //! themselves: the finer mesh has the very shape of the coarser one, curved sides included.
 
-use super::{Line, Mesh, Shape, Solid};
+use super::{Line, Mesh, Solid};
+use crate::element::kind::Place;
 
 /// A side that is halved: its nodes, and the middles of its two halves.
 #[derive(Clone, Copy, Debug)]
@@ -95,91 +96,27 @@ fn push(nodes: &mut Vec<[f64; 2]>, base: [f64; 2], parts: &[(f64, [f64; 2])]) ->
     nodes.len() - 1
 }
 
-/// Adds the four parts of an element: those at its corners in their order, of a triangle then the one
-/// in the middle. A part at a corner begins with it and goes round like the element.
+/// Adds the four parts of an element.
 fn divide(solid: &Solid, sides: &[Halves], nodes: &mut Vec<[f64; 2]>, into: &mut Vec<Solid>) {
-    let n = solid.n_corners();
-    let (corners, middles) = solid.nodes().split_at(n);
-    // The middle of the half of a side that has this end.
-    let half = |side: usize, end: usize| {
-        let Halves { first, middles } = sides[side];
-        middles[usize::from(first != end)]
+    let own = solid.nodes();
+    let at: Vec<[f64; 2]> = own.iter().map(|&node| nodes[node]).collect();
+    let division = (solid.kind().division)();
+    let mut add = |(base, parts): (usize, Vec<(f64, usize)>)| {
+        let parts: Vec<(f64, [f64; 2])> = parts.iter().map(|&(part, to)| (part, at[to])).collect();
+        push(nodes, at[base], &parts)
     };
-    let place: Vec<[f64; 2]> = solid.nodes().iter().map(|&node| nodes[node]).collect();
-    match solid.shape() {
-        Shape::Triangle => {
-            // Of the inner side across corner k, between the middles of the sides next to it.
-            let inner = [0, 1, 2].map(|k| {
-                let [before, after, across] = [(k + 2) % 3, k, (k + 1) % 3].map(|s| place[3 + s]);
-                let others = [place[(k + 1) % 3], place[(k + 2) % 3]];
-                // −1/8 of the corners beside, 1/2 of the middles beside, 1/4 of the one across.
-                let parts = [
-                    (0.5, before),
-                    (0.25, across),
-                    (-0.125, others[0]),
-                    (-0.125, others[1]),
-                ];
-                push(nodes, after, &parts)
-            });
-            for k in 0..3 {
-                let before = (k + 2) % 3;
-                let part = [
-                    corners[k],
-                    middles[k],
-                    middles[before],
-                    half(k, corners[k]),
-                    inner[k],
-                    half(before, corners[k]),
-                ];
-                into.push(Solid::triangle(part, solid.group));
-            }
-            let part = [
-                middles[0], middles[1], middles[2], inner[1], inner[2], inner[0],
-            ];
-            into.push(Solid::triangle(part, solid.group));
+    let inside: Vec<usize> = division.inside.into_iter().map(&mut add).collect();
+    let number = |place: &Place| match *place {
+        Place::Node(node) => own[node],
+        Place::Half(side, corner) => {
+            let Halves { first, middles } = sides[side];
+            middles[usize::from(first != own[corner])]
         }
-        Shape::Quad => {
-            let base = place[4];
-            let centre = [
-                (0.5, place[5]),
-                (0.5, place[6]),
-                (0.5, place[7]),
-                (-0.25, place[0]),
-                (-0.25, place[1]),
-                (-0.25, place[2]),
-                (-0.25, place[3]),
-            ];
-            let centre = push(nodes, base, &centre);
-            // Half way from the middle of side k to the centre.
-            let inner = [0, 1, 2, 3].map(|k| {
-                let side = |s: usize| place[4 + (k + s) % 4];
-                let corner = |s: usize| place[(k + s) % 4];
-                let parts = [
-                    (0.375, side(1)),
-                    (0.25, side(2)),
-                    (0.375, side(3)),
-                    (-0.1875, corner(0)),
-                    (-0.1875, corner(1)),
-                    (-0.1875, corner(2)),
-                    (-0.1875, corner(3)),
-                ];
-                push(nodes, side(0), &parts)
-            });
-            for k in 0..4 {
-                let before = (k + 3) % 4;
-                let part = [
-                    corners[k],
-                    middles[k],
-                    centre,
-                    middles[before],
-                    half(k, corners[k]),
-                    inner[k],
-                    inner[before],
-                    half(before, corners[k]),
-                ];
-                into.push(Solid::quad(part, solid.group));
-            }
-        }
+        Place::Inside(node) => inside[node],
+    };
+    for part in division.parts {
+        let nodes: Vec<usize> = part.iter().map(number).collect();
+        into.push(Solid::new(solid.kind(), &nodes, solid.group));
     }
 }
 

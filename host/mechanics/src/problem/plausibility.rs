@@ -1,9 +1,10 @@
 //! Input that can be computed but is seldom meant, in words and with numbers.
 
 use super::{Formulation, Material, Problem, Profile};
+use crate::element::QUAD8;
 use crate::ground::beside_joints;
 use crate::group::Group;
-use crate::mesh::{Mesh, Shape, Solid};
+use crate::mesh::{Mesh, Solid};
 use law::ParameterDescription;
 use std::collections::{HashMap, HashSet};
 
@@ -319,7 +320,7 @@ fn stacked(mesh: &Mesh, group: &Group) -> Option<String> {
     for element in 0..group.kinematics.n_elements() {
         let nodes = group.kinematics.nodes(element);
         let along = group.kinematics.axes(element).along;
-        let edges_of_quad = Shape::Quad.edges();
+        let edges_of_quad = QUAD8.edges;
         let reach = edges_of_quad.iter().map(|&[a, b, _]| {
             let [a, b] = [a, b].map(|i| mesh.nodes[nodes[i]]);
             let step = [b[0] - a[0], b[1] - a[1]];

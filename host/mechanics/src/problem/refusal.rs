@@ -134,6 +134,8 @@ pub enum Cause {
     NoElements(String),
     /// A thin layer has elements that are no quads.
     LayerOfTriangles(String),
+    /// Elements of so many nodes need more integration points.
+    TooFewPoints(String, usize),
     /// Something that does not go with the formulation.
     Misplaced(Key, Formulation),
     /// Earth pressure at rest in an interface.
@@ -384,6 +386,11 @@ impl fmt::Display for Cause {
             Self::LayerOfTriangles(group) => write!(
                 f,
                 "group `{group}` is a thin layer, which is made of quads, and has triangles"
+            ),
+            Self::TooFewPoints(group, n) => write!(
+                f,
+                "`integration`: elements of group `{group}` have {n} nodes, and with `reduced` nothing resists some of \
+                 their motions"
             ),
             Self::Misplaced(key, formulation) => write!(
                 f,
@@ -673,6 +680,7 @@ impl Cause {
                     "the normal goes across the layer: `normal = \"{other}\"`, or leave it out"
                 ));
             }
+            Self::TooFewPoints(..) => "choose `projected` or `full`, or elements of 8 nodes",
             Self::WhichWayAcross { .. } => "say `normal = \"x\"` or `normal = \"y\"` for the group",
             Self::TurnedSigns { .. } => {
                 "tension is positive: compression is written as a negative number"

@@ -1,6 +1,7 @@
-//! Elements of first order get middles; those of 9 nodes lose one.
+//! Elements of first order get middles.
 
 use super::*;
+use mechanics::element::QUAD9;
 use mechanics::mesh::Solid;
 
 /// The model with straight sides.
@@ -134,22 +135,32 @@ fn sides_of_what_is_left_out_are_known() {
     );
 }
 
+/// Quads of 9 nodes stay so, whichever way they go round.
 #[test]
-fn the_middle_of_nine_nodes_is_left_out() {
+fn quads_of_nine_nodes_keep_the_middle() {
     let (expected, _) = read(&model().write(4.1, Bytes::Text), &all()).unwrap();
     let mut nine = model();
     nine.nodes.insert(0, (7, [0.5, 0.5, 0.0]));
     let quad = &mut nine.elements[6];
     quad.2 = 10;
     quad.3.push(7);
-    for (version, bytes) in FORMATS {
-        let (mesh, notes) = read(&nine.write(version, bytes), &all()).unwrap();
-        assert_eq!(mesh, expected);
-        assert_eq!(
-            notes[0],
-            "1 quad is of 9 nodes: the one in the middle is left out"
-        );
-        assert_eq!(notes.len(), 3, "{notes:?}");
+    for clockwise in [false, true] {
+        if clockwise {
+            let nodes = &mut nine.elements[6].3;
+            nodes[1..4].reverse();
+            nodes[4..8].reverse();
+        }
+        for (version, bytes) in FORMATS {
+            let (mesh, notes) = read(&nine.write(version, bytes), &all()).unwrap();
+            assert_eq!(mesh.lines["bottom"].edges, expected.lines["bottom"].edges);
+            assert_eq!(mesh.solids[0].kind(), &QUAD9);
+            let at = |mesh: &Mesh, node: usize| mesh.nodes[mesh.solids[0].nodes()[node]];
+            for node in 0..8 {
+                assert_eq!(at(&mesh, node), at(&expected, node));
+            }
+            assert_eq!(at(&mesh, 8), [0.5, 0.5]);
+            assert_eq!(notes.len(), 2, "{notes:?}");
+        }
     }
     // That it is there at all is seen to.
     nine.nodes.remove(0);

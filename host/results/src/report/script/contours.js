@@ -5,7 +5,7 @@ part(() => {
   if (!host) return;
   const drawn = runs.filter(run => run.fields);
   // By number of nodes: those of a quad or triangle around it, of an edge along it.
-  const OUTLINE = { 8: [0, 4, 1, 5, 2, 6, 3, 7], 6: [0, 3, 1, 4, 2, 5], 3: [0, 2, 1] };
+  const OUTLINE = { 9: [0, 4, 1, 5, 2, 6, 3, 7], 8: [0, 4, 1, 5, 2, 6, 3, 7], 6: [0, 3, 1, 4, 2, 5], 3: [0, 2, 1] };
   const isSolid = cell => cell.length > 3;
   const axes = run => (run.axisymmetric ? ['r', 'z'] : ['x', 'y']);
 
@@ -20,7 +20,7 @@ part(() => {
     const edges = new Map();
     fields.cells.forEach((cell, c) => {
       if (!isSolid(cell)) return;
-      const corners = cell.length / 2;
+      const corners = Math.floor(cell.length / 2);
       for (let k = 0; k < corners; k++) {
         const nodes = [cell[k], cell[corners + k], cell[(k + 1) % corners]];
         const key = nodes[0] < nodes[2] ? `${nodes[0]} ${nodes[2]}` : `${nodes[2]} ${nodes[0]}`;

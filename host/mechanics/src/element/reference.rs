@@ -1,7 +1,4 @@
-//! Reference elements: shape functions of the 8-node quad, the 6-node triangle and the 3-node line,
-//! and Gauss rules.
-
-use crate::mesh::Shape;
+//! Reference elements: what a kind of element is in its own coordinates. Gauss rules, and the 3-node line.
 
 /// Shape functions at a point, and their derivatives by ξ and η.
 pub(super) type Functions<const N: usize> = ([f64; N], [[f64; N]; 2]);
@@ -18,8 +15,17 @@ pub(super) struct Reference<const N: usize> {
     pub(super) exact: fn() -> Vec<RulePoint>,
     /// The same where sides are curved: degree 7 in ξ and in η of quads, 6 of triangles.
     pub(super) exact_curved: fn() -> Vec<RulePoint>,
+    /// The rule with so many points along ξ and η ([`Points::along`](super::kind::Points)).
+    pub(super) rule: fn([usize; 2]) -> Vec<RulePoint>,
     /// Corners and middle of every side.
     pub(super) sides: &'static [[usize; 3]],
+    /// Functions that strains can be projected on.
+    pub(super) functions: Option<ProjectedOn>,
+}
+
+/// Functions that strains are projected on: as many as there are points.
+#[derive(Debug)]
+pub(super) struct ProjectedOn {
     /// The function that is one at the first point and zero at the other points of the law,
     /// evaluated at the second argument.
     pub(super) function: fn([f64; 2], [f64; 2]) -> f64,
@@ -36,22 +42,22 @@ impl<const N: usize> Reference<N> {
 }
 
 /// How far the middle of a side (ends, middle) lies off that of its ends, as a part of its length.
-fn off([a, b, m]: [[f64; 2]; 3]) -> f64 {
+pub(super) fn off([a, b, m]: [[f64; 2]; 3]) -> f64 {
     let off = [0, 1].map(|c| m[c] - f64::midpoint(a[c], b[c]));
     off[0].hypot(off[1]) / (b[0] - a[0]).hypot(b[1] - a[1])
 }
 
-/// Whether the sides of a quad along ξ, and those along η, turn too much to be followed by two points along them.
-pub(super) fn bent(places: &[[f64; 2]; 8]) -> [bool; 2] {
-    let is_bent = |side: usize| off(QUAD8.sides[side].map(|node| places[node])) > BENT;
-    [0, 1].map(|first| is_bent(first) || is_bent(first + 2))
-}
-
 /// A side whose middle lies off the middle of its ends by less than this part of it is straight.
 const STRAIGHT: f64 = 1e-12;
-/// A side whose middle lies off by less turns by less than 5°: two points follow it within 10⁻⁴ (a ring's
-/// displacements).
-const BENT: f64 = 1e-2;
+
+/// Edges of quads: first corner, second corner, middle.
+pub(super) const EDGES_OF_QUAD: [[usize; 3]; 4] = [[0, 1, 4], [1, 2, 5], [2, 3, 6], [3, 0, 7]];
+
+/// Area between the corners of a quad.
+pub(super) fn area_of_quad(places: &[[f64; 2]]) -> f64 {
+    let [a, b, c, d] = [0, 1, 2, 3].map(|corner| places[corner]);
+    0.5 * ((c[0] - a[0]) * (d[1] - b[1]) - (d[0] - b[0]) * (c[1] - a[1])).abs()
+}
 
 /// An integration point of the reference element.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,7 +68,7 @@ pub(super) struct RulePoint {
 }
 
 /// The rule with `n_xi` × `n_eta` Gauss points of a quad.
-pub(super) fn quad_rule(n_xi: usize, n_eta: usize) -> Vec<RulePoint> {
+pub(super) fn quad_rule([n_xi, n_eta]: [usize; 2]) -> Vec<RulePoint> {
     let ((xi, w_xi), (eta, w_eta)) = (gauss(n_xi), gauss(n_eta));
     let mut points = Vec::with_capacity(n_xi * n_eta);
     for (&eta, &w_eta) in eta.iter().zip(w_eta) {
@@ -86,7 +92,7 @@ pub(super) fn triangle_rule(n: usize) -> Vec<RulePoint> {
 }
 
 /// The rule with 4 × 4 Gauss points of a square of which one side is drawn together: exact to degree 6.
-fn collapsed_rule() -> Vec<RulePoint> {
+pub(super) fn collapsed_rule() -> Vec<RulePoint> {
     let (at, weights) = gauss(4);
     let unit = || {
         at.iter()
@@ -101,44 +107,6 @@ fn collapsed_rule() -> Vec<RulePoint> {
     };
     unit().flat_map(of_column).collect()
 }
-
-/// The 8-node quad, ξ and η from −1 to 1.
-pub(super) const QUAD8: Reference<8> = Reference {
-    shape: |[xi, eta]| quad_shape(xi, eta),
-    area: |&[a, b, c, d, ..]| {
-        0.5 * ((c[0] - a[0]) * (d[1] - b[1]) - (d[0] - b[0]) * (c[1] - a[1])).abs()
-    },
-    exact: || quad_rule(3, 3),
-    exact_curved: || quad_rule(4, 4),
-    sides: Shape::Quad.edges(),
-    // Bilinear between the 2 × 2 points at ±1/√3.
-    function: |[a, b], [xi, eta]| 0.25 * (1.0 + 3.0 * a * xi) * (1.0 + 3.0 * b * eta),
-    beyond_linear: |[n_xi, n_eta], [xi, eta]| {
-        let all = (0..n_xi).flat_map(|a| (0..n_eta).map(move |b| (a, b)));
-        let beyond = all.filter(|(a, b)| a + b > 1);
-        beyond
-            .map(|(a, b)| xi.powi(a as i32) * eta.powi(b as i32))
-            .collect()
-    },
-};
-
-/// The 6-node triangle with corners (0, 0), (1, 0), (0, 1).
-pub(super) const TRI6: Reference<6> = Reference {
-    shape: |[xi, eta]| triangle_shape(xi, eta),
-    area: |&[a, b, c, ..]| {
-        0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])).abs()
-    },
-    exact: || triangle_rule(6),
-    exact_curved: collapsed_rule,
-    sides: Shape::Triangle.edges(),
-    // Linear between the points with area coordinates (2/3, 1/6, 1/6).
-    function: |a, at| {
-        let area = |[xi, eta]: [f64; 2]| [1.0 - xi - eta, xi, eta];
-        let products = area(a).into_iter().zip(area(at)).map(|(a, b)| a * b);
-        4.0 * products.sum::<f64>() - 1.0
-    },
-    beyond_linear: |_, _| Vec::new(),
-};
 
 /// Points and weights of the Gauss rule with `n` points on (−1, 1); exact to degree 2n − 1.
 ///
@@ -213,49 +181,6 @@ pub(super) fn gauss_triangle(n: usize) -> &'static [([f64; 2], f64)] {
     }
 }
 
-/// Shape functions of the 6-node triangle at (ξ, η), and their derivatives by ξ and η.
-fn triangle_shape(xi: f64, eta: f64) -> Functions<6> {
-    // Area coordinates, and their derivatives.
-    let l = [1.0 - xi - eta, xi, eta];
-    let d = [[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]];
-    let next = |i: usize| (i + 1) % 3;
-    let n = std::array::from_fn(|i| match i {
-        0..3 => l[i] * (2.0 * l[i] - 1.0),
-        _ => 4.0 * l[i - 3] * l[next(i - 3)],
-    });
-    let derivative = |d: [f64; 3]| {
-        std::array::from_fn(|i| match i {
-            0..3 => (4.0 * l[i] - 1.0) * d[i],
-            _ => 4.0 * (d[i - 3] * l[next(i - 3)] + l[i - 3] * d[next(i - 3)]),
-        })
-    };
-    (n, d.map(derivative))
-}
-
-/// Shape functions of the 8-node quad at (ξ, η), and their derivatives by ξ and η.
-fn quad_shape(xi: f64, eta: f64) -> Functions<8> {
-    const CORNERS: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
-    let mut n = [0.0; 8];
-    let mut d = [[0.0; 8]; 2];
-    for (i, [a, b]) in CORNERS.into_iter().enumerate() {
-        let (x, y) = (a * xi, b * eta);
-        n[i] = 0.25 * (1.0 + x) * (1.0 + y) * (x + y - 1.0);
-        d[0][i] = 0.25 * a * (1.0 + y) * (2.0 * x + y);
-        d[1][i] = 0.25 * b * (1.0 + x) * (x + 2.0 * y);
-    }
-    for (i, b) in [(4, -1.0), (6, 1.0)] {
-        n[i] = 0.5 * (1.0 - xi * xi) * (1.0 + b * eta);
-        d[0][i] = -xi * (1.0 + b * eta);
-        d[1][i] = 0.5 * b * (1.0 - xi * xi);
-    }
-    for (i, a) in [(5, 1.0), (7, -1.0)] {
-        n[i] = 0.5 * (1.0 - eta * eta) * (1.0 + a * xi);
-        d[0][i] = 0.5 * a * (1.0 - eta * eta);
-        d[1][i] = -eta * (1.0 + a * xi);
-    }
-    (n, d)
-}
-
 /// Shape functions of the 3-node line (ends, middle) at ξ, and their derivatives.
 pub fn line_shape(xi: f64) -> ([f64; 3], [f64; 3]) {
     (
@@ -268,58 +193,6 @@ pub fn line_shape(xi: f64) -> ([f64; 3], [f64; 3]) {
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
-
-    const QUAD_NODES: [[f64; 2]; 8] = [
-        [-1.0, -1.0],
-        [1.0, -1.0],
-        [1.0, 1.0],
-        [-1.0, 1.0],
-        [0.0, -1.0],
-        [1.0, 0.0],
-        [0.0, 1.0],
-        [-1.0, 0.0],
-    ];
-    const TRIANGLE_NODES: [[f64; 2]; 6] = [
-        [0.0, 0.0],
-        [1.0, 0.0],
-        [0.0, 1.0],
-        [0.5, 0.0],
-        [0.5, 0.5],
-        [0.0, 0.5],
-    ];
-
-    fn check_shape<const N: usize>(reference: &Reference<N>, nodes: [[f64; 2]; N], at: [f64; 2]) {
-        let (n, d) = (reference.shape)(at);
-        assert_relative_eq!(n.iter().sum::<f64>(), 1.0, epsilon = 1e-15);
-        for derivative in d {
-            assert_relative_eq!(derivative.iter().sum::<f64>(), 0.0, epsilon = 1e-15);
-        }
-        for (i, node) in nodes.into_iter().enumerate() {
-            let (n, _) = (reference.shape)(node);
-            for (j, n) in n.into_iter().enumerate() {
-                assert_relative_eq!(n, f64::from(u8::from(i == j)), epsilon = 1e-15);
-            }
-        }
-        let h = 1e-6;
-        for axis in 0..2 {
-            let moved = |by: f64| {
-                let mut there = at;
-                there[axis] += by;
-                (reference.shape)(there).0
-            };
-            let (ahead, behind) = (moved(h), moved(-h));
-            for i in 0..N {
-                let difference = (ahead[i] - behind[i]) / (2.0 * h);
-                assert_relative_eq!(d[axis][i], difference, epsilon = 1e-9);
-            }
-        }
-    }
-
-    #[test]
-    fn shape_functions_sum_to_one_and_derivatives_agree_with_differences() {
-        check_shape(&QUAD8, QUAD_NODES, [0.3, -0.7]);
-        check_shape(&TRI6, TRIANGLE_NODES, [0.3, 0.15]);
-    }
 
     #[test]
     fn triangle_rules_are_exact_to_their_degree() {
