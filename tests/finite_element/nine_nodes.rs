@@ -24,7 +24,6 @@ pub(crate) fn on_nine_nodes(case: &str, folder: &Path) -> String {
     let groups = bare["groups"].as_table_mut().unwrap();
     groups.retain(|_, group| is_solid(group));
     bare.remove("probes");
-    bare.remove("phase");
     let source = Source::new("bare.toml", toml::to_string(&bare).unwrap());
     let posed = Case::of(source).unwrap()[0].pose().unwrap();
     let names: Vec<&str> = posed
