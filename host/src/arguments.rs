@@ -9,11 +9,11 @@ use workshop::new_law::NewLaw;
 #[derive(Parser)]
 #[command(name = "pilum", version, max_term_width = 100)]
 pub(crate) struct Arguments {
-    /// Open libraries that are not known yet without trying them in a child process first.
+    /// Open unknown libraries without a trial in a child process.
     #[arg(long, global = true)]
     pub(crate) no_probe: bool,
-    /// Call laws in separate processes, so that one that crashes ends the increment and not the
-    /// program; a call may take this many seconds.
+    /// Call laws in separate processes: a crash ends the increment and not the program. Seconds
+    /// that a call may take, default 10.
     #[arg(
         long,
         global = true,
@@ -37,22 +37,21 @@ pub(crate) enum Command {
         /// Run only this variant of it.
         #[arg(long)]
         variant: Option<String>,
-        /// Override what the file says, in every variant: KEY is its dotted path in the file, VALUE
-        /// in the file's syntax, such as `solver.max_iterations=40`; may be repeated.
+        /// Override a setting of the file and its variants: KEY is the dotted path, VALUE as in the
+        /// file, such as `solver.max_iterations=40`; may be repeated.
         #[arg(long, value_name = "KEY=VALUE")]
         set: Vec<String>,
         /// Folder for the results [default: results/CASE or results/CASE/VARIANT].
         #[arg(long)]
         out: Option<PathBuf>,
-        /// Read, build and check everything and compute nothing: `report.html` shows mesh, lines,
-        /// supports, loads, water, initial stress and what is active when. A folder that holds the
-        /// results of a run is refused.
+        /// Check everything and compute nothing: `report.html` shows mesh, lines, supports, loads,
+        /// water, initial stress and active groups. A folder with results of a run is refused.
         #[arg(long, conflicts_with_all = ["resume", "record", "checkpoint"])]
         dry_run: bool,
-        /// Go on from where an earlier run into the same folder was stopped, or start if none was.
+        /// Go on from where an earlier run into the folder was stopped, or start.
         #[arg(long)]
         resume: bool,
-        /// Seconds between checkpoints, from which a run can be resumed, or 20 times what the last one took if that is
+        /// Seconds between checkpoints for `--resume`, or 20 times what the last one took if
         /// longer; 0: after every increment.
         #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = not_negative)]
         checkpoint: f64,
@@ -60,7 +59,7 @@ pub(crate) enum Command {
         /// only after 0.1 s].
         #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
         threads: Option<u16>,
-        /// Write all arguments of one call of the case's UMAT to this file, before and after it.
+        /// Write the arguments of one call of the UMAT to this file, before and after it.
         #[arg(long, value_name = "FILE")]
         record: Option<PathBuf>,
     },
@@ -68,46 +67,46 @@ pub(crate) enum Command {
     Point {
         /// A driver file, or with `--umat` the `test.inp` of an IncrementalDriver.
         driver: PathBuf,
-        /// Read input of the IncrementalDriver, and run it with this Abaqus user subroutine.
+        /// Run input of the IncrementalDriver with this Abaqus user subroutine.
         #[arg(long, value_name = "LIBRARY", conflicts_with_all = ["variant", "set"])]
         umat: Option<PathBuf>,
         /// Run only this variant of it.
         #[arg(long)]
         variant: Option<String>,
-        /// Override what the file says, in every variant: KEY is its dotted path in the file, VALUE
-        /// in the file's syntax, such as `solver.max_iterations=40`; may be repeated.
+        /// Override a setting of the file and its variants: KEY is the dotted path, VALUE as in the
+        /// file, such as `solver.max_iterations=40`; may be repeated.
         #[arg(long, value_name = "KEY=VALUE")]
         set: Vec<String>,
         /// File for the table; standard output if left out.
         #[arg(long)]
         csv: Option<PathBuf>,
-        /// Write all arguments of one call of the UMAT to this file, before and after it.
+        /// Write the arguments of one call of the UMAT to this file, before and after it.
         #[arg(long, value_name = "FILE")]
         record: Option<PathBuf>,
     },
-    /// Carry out many runs of one case, as a study file plans them; one that was ended goes on.
+    /// Carry out the runs of a study file, or go on with them.
     Study {
         /// A study file, or a folder with `study.toml`.
         file: PathBuf,
         /// Folder for the results [default: results/STUDY].
         #[arg(long)]
         out: Option<PathBuf>,
-        /// So many runs at a time, each in a separate process [default: one for each processor].
+        /// Number of runs at a time, each in a separate process [default: one for each processor].
         #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
         jobs: Option<u16>,
-        /// Check everything, write the table of runs and carry out none, whatever `--jobs` and `--retry` say.
+        /// Check everything, write the table of runs and carry out none.
         #[arg(long, conflicts_with = "run")]
         plan: bool,
-        /// Carry out this run alone, unless it is done: for programs that distribute work.
+        /// Carry out this run alone, unless it is done, for programs that distribute work.
         #[arg(long, value_name = "INDEX", conflicts_with_all = ["jobs", "retry"])]
         run: Option<usize>,
-        /// Carry out runs that failed once more.
+        /// Repeat runs that failed.
         #[arg(long)]
         retry: bool,
         /// Forget what was done before.
         #[arg(long)]
         anew: bool,
-        /// Seconds between checkpoints, from which a run can be resumed, or 20 times what the last one took if that is
+        /// Seconds between checkpoints for `--resume`, or 20 times what the last one took if
         /// longer; 0: after every increment.
         #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = not_negative)]
         checkpoint: f64,
@@ -115,7 +114,7 @@ pub(crate) enum Command {
         #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
         threads: Option<u16>,
     },
-    /// Write the report of a run or of a study, or the comparison of several runs.
+    /// Write the report of a run or a study, or the comparison of several runs.
     Report {
         /// Results folders.
         #[arg(required = true)]
@@ -124,7 +123,7 @@ pub(crate) enum Command {
         #[arg(long)]
         out: Option<PathBuf>,
     },
-    /// Write a table of runs, one row each: the settings that differ, last values of probes.
+    /// Write a table of runs: settings that differ, last values of probes.
     Table {
         /// Results folders, or folders with results folders below.
         #[arg(required = true)]
@@ -133,15 +132,15 @@ pub(crate) enum Command {
         #[arg(long)]
         out: Option<PathBuf>,
     },
-    /// Measure what accuracy costs: the settings of a case or driver, error against CPU time.
+    /// Measure error against CPU time for many settings of a case or driver.
     TradeOff {
         /// A case file, a folder with `case.toml`, or a driver file.
         input: PathBuf,
         /// Study only this variant of it.
         #[arg(long)]
         variant: Option<String>,
-        /// Override what the file says, in every variant: KEY is its dotted path in the file, VALUE
-        /// in the file's syntax, such as `solver.max_iterations=40`; may be repeated.
+        /// Override a setting of the file and its variants: KEY is the dotted path, VALUE as in the
+        /// file, such as `solver.max_iterations=40`; may be repeated.
         #[arg(long, value_name = "KEY=VALUE")]
         set: Vec<String>,
         /// Folder for the results [default: `results/trade_off_NAME`].
@@ -159,32 +158,32 @@ pub(crate) enum Command {
         /// Most increments per segment of a driver.
         #[arg(long, default_value_t = 1000)]
         max_increments: usize,
-        /// Instead: what stiffness the interfaces of no thickness should have.
+        /// Instead: find the stiffness that interfaces without thickness should have.
         #[arg(long)]
         interface_stiffness: bool,
     },
-    /// Find parameters of laws from measured curves, and how well the tests determine them.
+    /// Find parameters of laws from measured curves, with intervals.
     Calibrate {
-        /// A calibration: free parameters, and tests with what was measured in them.
+        /// A calibration file.
         file: PathBuf,
         /// Carry out only this variant of it.
         #[arg(long)]
         variant: Option<String>,
-        /// Override what the file says, in every variant: KEY is its dotted path in the file, VALUE
-        /// in the file's syntax, such as `starts=20`; may be repeated.
+        /// Override a setting of the file and its variants: KEY is the dotted path, VALUE as in the
+        /// file, such as `starts=20`; may be repeated.
         #[arg(long, value_name = "KEY=VALUE")]
         set: Vec<String>,
         /// Folder for the results [default: `results/calibrate_NAME`].
         #[arg(long)]
         out: Option<PathBuf>,
-        /// Forget what an earlier call that was ended has computed.
+        /// Forget what an earlier, ended call has computed.
         #[arg(long)]
         anew: bool,
         /// Threads of the runs of cases; the results do not depend on it [default: all processors].
         #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
         threads: Option<u16>,
     },
-    /// Check whether a library keeps the contract; each check runs in a separate process.
+    /// Check whether a library keeps the contract.
     Check(workshop::check::Arguments),
     /// List the laws found, or show all about one of them.
     Laws {
@@ -193,7 +192,7 @@ pub(crate) enum Command {
         /// A folder with law libraries, looked in first; may be repeated.
         #[arg(long, value_name = "DIR")]
         law_path: Vec<PathBuf>,
-        /// Instead: the folders that laws are looked for in, in order, and what each has.
+        /// Instead: the folders that are searched for laws, in order, with their content.
         #[arg(long = "where", conflicts_with = "id")]
         places: bool,
         /// As JSON.
@@ -208,16 +207,16 @@ pub(crate) enum Command {
         #[arg(long)]
         json: bool,
     },
-    /// Write the libraries that a case or driver uses, with their SHA-256, to a lock file next to it.
+    /// Write the libraries of a case or driver, with their SHA-256, to a lock file next to it.
     Lock {
         /// A case file, a folder with `case.toml`, or a driver file.
         input: PathBuf,
     },
-    /// Repeat the call of a law that failed, from the file that a run left in its results.
+    /// Repeat the failed call of a law, from the file in the results of a run.
     Replay {
         /// A `failure.toml`.
         capsule: PathBuf,
-        /// Write all arguments of the call, that of a UMAT, to this file, before and after it.
+        /// Write the arguments of the call of a UMAT to this file, before and after it.
         #[arg(long, value_name = "FILE")]
         record: Option<PathBuf>,
         /// Call the law in this process, for a debugger.
@@ -226,8 +225,8 @@ pub(crate) enum Command {
     },
     /// Write a small project for a law that builds and runs.
     NewLaw(NewLaw),
-    /// Write the sidecar of an Abaqus user subroutine: names for its parameters and internal variables,
-    /// to be filled in.
+    /// Write the sidecar of an Abaqus user subroutine: names of its parameters and internal
+    /// variables, to be filled in.
     NewSidecar(workshop::new_sidecar::NewSidecar),
     /// Print the JSON Schema of an input file, for editors.
     Schema {

@@ -81,7 +81,12 @@ impl Schema {
     fn kind(&self, value: &Value, places: &BTreeMap<String, String>) -> String {
         if let Some(name) = Self::named(value) {
             if let Some(place) = places.get(name) {
-                return format!("[table]({place})");
+                let what = if name == "Over" {
+                    "over the height"
+                } else {
+                    "table"
+                };
+                return format!("[{what}]({place})");
             }
             if name == "Variant" {
                 return "keys of this file, and `name`".to_owned();
@@ -96,8 +101,11 @@ impl Schema {
             }
             if let Some(kinds) = definition["anyOf"].as_array() {
                 let mut kinds: Vec<_> = kinds.iter().map(|kind| self.kind(kind, places)).collect();
-                // A whole number is a number.
+                // A whole number is a number, and values over the height may be points alone.
                 kinds.retain(|kind| kind != "whole number");
+                if kinds.iter().any(|kind| kind.starts_with("[over")) {
+                    kinds.retain(|kind| !kind.starts_with("array"));
+                }
                 return kinds.join(" or ");
             }
             let labels: Vec<_> = self
@@ -124,11 +132,13 @@ impl Schema {
                 _ => "whole number".to_owned(),
             },
             Some("string") => "text".to_owned(),
-            Some("boolean") => "`true`, `false`".to_owned(),
+            Some("boolean") => "boolean".to_owned(),
             Some("array") => {
                 let of = self.kind(&value["items"], places);
-                match value["maxItems"].as_u64() {
-                    Some(2) => format!("[{of}, {of}]"),
+                match (value["maxItems"].as_u64(), of.as_str()) {
+                    (Some(2), _) => format!("[{of}, {of}]"),
+                    (None, "text" | "whole number") => format!("{of}s"),
+                    _ if of.starts_with("[table]") => of.replacen("table", "tables", 1),
                     _ => format!("array: {of}"),
                 }
             }
@@ -141,48 +151,120 @@ impl Schema {
         }
     }
 
-    /// The table of keys of a definition.
-    fn table(&self, name: &str, places: &BTreeMap<String, String>) -> String {
+    /// The rows of a definition, each with its key in the schema.
+    fn rows(&self, name: &str, places: &BTreeMap<String, String>) -> Vec<(String, Row)> {
         let definition = &self.definitions[name];
         let keys = definition["properties"].as_object().unwrap();
         let required = definition["required"].as_array();
-        let mut table = "| key | takes | if left out | |\n|---|---|---|---|\n".to_owned();
-        let mut choices = String::new();
+        let mut rows = Vec::new();
+        // Choices that the table explains already, by the first key that takes them.
+        let mut explained: BTreeMap<&str, &str> = BTreeMap::new();
         for (key, value) in keys {
             // In axisymmetry, another name for the same.
             let other = match key.as_str() {
                 "r" if same(keys.get("x"), keys.get("r")) => continue,
                 "z" if same(keys.get("y"), keys.get("z")) => continue,
-                "x" if keys.contains_key("r") => Some("r"),
-                "y" if keys.contains_key("z") => Some("z"),
-                _ => None,
+                "x" if keys.contains_key("r") => ", `r`",
+                "y" if keys.contains_key("z") => ", `z`",
+                _ => "",
             };
-            let other = other
-                .map(|other| format!(", `{other}`"))
-                .unwrap_or_default();
+            let (mut takes, mut meaning) = (self.kind(value, places), text(value));
+            let labels = self.labels(value);
+            match Self::named(value).filter(|_| !labels.is_empty()) {
+                Some(choice) if explained.contains_key(choice) => {
+                    takes = format!("as `{}`", explained[choice]);
+                }
+                Some(choice) => {
+                    takes = "choice".to_owned();
+                    explained.insert(choice, key);
+                    for (label, means) in labels {
+                        write!(meaning, "<br>`{label}`: {means}").unwrap();
+                    }
+                }
+                None => {}
+            }
             let is_required =
                 required.is_some_and(|names| names.contains(&Value::from(key.as_str())));
-            let default = match value.get("default") {
-                _ if is_required => "**required**".to_owned(),
-                None | Some(Value::Null | Value::Object(_) | Value::Array(_)) => String::new(),
-                Some(Value::String(text)) if text.is_empty() => String::new(),
-                Some(value) => format!("`{value}`"),
+            let is_worth_saying = |default: &&Value| match default {
+                Value::Null | Value::Object(_) | Value::Array(_) => false,
+                Value::String(text) => !is_required && !text.is_empty(),
+                _ => !is_required,
             };
-            let kind = self.kind(value, places);
-            writeln!(
-                table,
-                "| `{key}`{other} | {kind} | {default} | {} |",
-                text(value)
-            )
-            .unwrap();
-            for (label, meaning) in self.labels(value) {
-                writeln!(choices, "| `{key} = \"{label}\"` | {meaning} |").unwrap();
+            if let Some(default) = value.get("default").filter(is_worth_saying) {
+                write!(takes, " (`{default}`)").unwrap();
+            }
+            let row = Row {
+                keys: format!("`{key}`{other}"),
+                is_required,
+                takes,
+                meaning,
+            };
+            rows.push((key.clone(), row));
+        }
+        rows
+    }
+
+    /// The table of keys of a definition. `shared`: keys that other pages link to, with their rows and place.
+    fn table(
+        &self,
+        name: &str,
+        places: &BTreeMap<String, String>,
+        shared: &[(String, Row, &'static str)],
+    ) -> String {
+        let mut rows: Vec<Row> = Vec::new();
+        let mut elsewhere: BTreeMap<&str, Vec<Row>> = BTreeMap::new();
+        for (key, row) in self.rows(name, places) {
+            let known = shared.iter().find(|(other, there, _)| {
+                *other == key && *there == row && !row.is_required && name.ends_with("File")
+            });
+            match known {
+                Some((_, _, place)) => elsewhere.entry(*place).or_default().push(row),
+                None => rows.push(row),
             }
         }
-        if !choices.is_empty() {
-            table = format!("{table}\n| value | |\n|---|---|\n{choices}");
+        // A row is no longer than a link.
+        for alone in elsewhere.values_mut().filter(|rows| rows.len() == 1) {
+            rows.append(alone);
+        }
+        let mut table = "| key | takes | |\n|---|---|---|\n".to_owned();
+        let mut merged: Vec<Row> = Vec::new();
+        for row in rows {
+            match merged.iter_mut().find(|other| other.says_the_same(&row)) {
+                Some(other) => write!(other.keys, ", {}", row.keys).unwrap(),
+                None => merged.push(row),
+            }
+        }
+        for row in merged {
+            let mark = if row.is_required { "**" } else { "" };
+            writeln!(
+                table,
+                "| {mark}{}{mark} | {} | {} |",
+                row.keys, row.takes, row.meaning
+            )
+            .unwrap();
+        }
+        for (place, rows) in elsewhere.iter().filter(|(_, rows)| !rows.is_empty()) {
+            let keys: Vec<_> = rows.iter().map(|row| row.keys.as_str()).collect();
+            writeln!(table, "| {} | [as in a case]({place}) | |", keys.join(", ")).unwrap();
         }
         table
+    }
+}
+
+/// What a table says of keys.
+#[derive(PartialEq, Eq)]
+struct Row {
+    keys: String,
+    is_required: bool,
+    takes: String,
+    meaning: String,
+}
+
+impl Row {
+    /// Whether it differs from the other in its keys alone.
+    fn says_the_same(&self, other: &Self) -> bool {
+        (self.is_required, &self.takes, &self.meaning)
+            == (other.is_required, &other.takes, &other.meaning)
     }
 }
 
@@ -201,13 +283,13 @@ fn text(value: &Value) -> String {
 
 // --- pages --------------------------------------------------------------------------------------
 
-/// The names of a page's marks `<!-- KIND of NAME: begin -->`, each with its line.
+/// The names of a page's marks `<!-- KIND of NAME -->`, each with its line.
 fn marks(text: &str, kind: &str) -> Vec<(usize, String)> {
     let prefix = format!("<!-- {kind} of ");
     let lines = text.lines().enumerate();
     lines
         .filter_map(|(n, line)| {
-            let name = line.strip_prefix(&prefix)?.strip_suffix(": begin -->")?;
+            let name = line.strip_prefix(&prefix)?.strip_suffix(" -->")?;
             Some((n + 1, name.to_owned()))
         })
         .collect()
@@ -220,7 +302,7 @@ fn filled(text: &str, kind: &str, content: impl Fn(&str) -> String) -> String {
     while let Some(at) = rest.find(&begin) {
         let (before, after) = rest.split_at(at);
         let (mark, after) = after.split_once('\n').unwrap();
-        let name = &mark[begin.len()..mark.len() - ": begin -->".len()];
+        let name = &mark[begin.len()..mark.len() - " -->".len()];
         let (_, after) = after.split_once("<!-- end -->").unwrap();
         write!(page, "{before}{mark}\n{}<!-- end -->", content(name)).unwrap();
         rest = after;
@@ -253,7 +335,7 @@ fn places(file: &str, text: &str) -> BTreeMap<String, String> {
             heading = line;
         }
         if let Some(name) = line.strip_prefix("<!-- keys of ") {
-            let name = name.strip_suffix(": begin -->").unwrap();
+            let name = name.strip_suffix(" -->").unwrap();
             places.insert(name.to_owned(), format!("{file}#{}", anchor(heading)));
         }
     }
@@ -277,6 +359,15 @@ fn schemas() -> [(Schema, &'static str); 4] {
 fn keys_are_those_of_the_schemas() {
     let read = |name: &str| fs::read_to_string(page(name)).unwrap();
     let of_cases = places("case.md", &read("case.md"));
+    let [(case, _), ..] = schemas();
+    let mut of_a_case = Vec::new();
+    for (name, place) in [
+        ("CaseFile", "case.md#the-file"),
+        ("LawInput", "case.md#laws"),
+    ] {
+        let rows = case.rows(name, &of_cases).into_iter();
+        of_a_case.extend(rows.map(|(key, row)| (key, row, place)));
+    }
     for (schema, name) in schemas() {
         let text = read(name);
         let mut places = of_cases.clone();
@@ -284,9 +375,14 @@ fn keys_are_those_of_the_schemas() {
         for table in schema.tables() {
             assert!(places.contains_key(table), "{name} has no keys of {table}");
         }
+        let shared = if name == "case.md" {
+            &of_a_case[..0]
+        } else {
+            &of_a_case[..]
+        };
         bless(
             &page(name),
-            &filled(&text, "keys", |of| schema.table(of, &places)),
+            &filled(&text, "keys", |of| schema.table(of, &places, shared)),
         );
     }
 }
@@ -303,6 +399,11 @@ fn keys(value: &toml::Value, found: &mut BTreeSet<String>) {
         toml::Value::Array(array) => array.iter().for_each(|value| keys(value, found)),
         _ => {}
     }
+}
+
+/// Whether a row of a table says that a case has this key, too.
+fn is_shared(row: &str, key: &str) -> bool {
+    row.contains("[as in a case]") && row.contains(&format!("`{key}`"))
 }
 
 /// The examples below a table have all of its keys.
@@ -326,6 +427,8 @@ fn every_key_has_an_example() {
             let missing: Vec<_> = known
                 .keys()
                 .filter(|key| !used.contains(*key))
+                // Those of a case have their examples there.
+                .filter(|key| !text.lines().any(|line| is_shared(line, key)))
                 // Another name for x or y.
                 .filter(|key| !(["r", "z"].contains(&key.as_str()) && known.contains_key("x")))
                 .collect();
@@ -406,23 +509,91 @@ fn every_example_runs() {
     }
 }
 
-/// The commands that `pilum help` lists.
-fn commands() -> Vec<String> {
-    let help = printed(&["--help"]);
-    let list = help
-        .split("Commands:\n")
-        .nth(1)
-        .unwrap()
-        .split("\n\n")
-        .next()
-        .unwrap();
-    list.lines()
-        .filter_map(|line| line.strip_prefix("  "))
-        .filter(|line| !line.starts_with(' '))
-        .filter_map(|line| line.split_whitespace().next())
-        .filter(|name| *name != "help")
-        .map(str::to_owned)
-        .collect()
+/// The help of a command: how it is used, and what it lists with the text of each.
+struct Help {
+    usage: String,
+    listed: Vec<(String, String)>,
+}
+
+impl Help {
+    fn of(command: &str) -> Self {
+        let help = match command {
+            "pilum" => printed(&["--help"]),
+            name => printed(&["help", name]),
+        };
+        let (mut usage, mut listed) = (String::new(), Vec::<(String, String)>::new());
+        for line in help.lines() {
+            let rest = line.trim_start();
+            let indent = line.len() - rest.len();
+            if let Some(text) = line.strip_prefix("Usage: ") {
+                text.clone_into(&mut usage);
+            } else if (1..=6).contains(&indent) {
+                let (name, text) = rest.split_once("  ").unwrap_or((rest, ""));
+                listed.push((name.to_owned(), text.trim().to_owned()));
+            } else if indent > 6 && !["", "Possible values:"].contains(&rest) {
+                let (_, text) = listed.last_mut().unwrap();
+                let words: Vec<_> = rest.split_whitespace().collect();
+                let (gap, words) = match words.as_slice() {
+                    ["-", value, words @ ..] => {
+                        write!(text, "<br>`{}`:", value.trim_end_matches(':')).unwrap();
+                        (" ", words)
+                    }
+                    words if text.is_empty() => ("", words),
+                    words => (" ", words),
+                };
+                write!(text, "{gap}{}", words.join(" ")).unwrap();
+            }
+        }
+        Self { usage, listed }
+    }
+
+    /// The commands that it lists, with their texts.
+    fn commands(&self) -> impl Iterator<Item = &(String, String)> {
+        let is_command = |(name, _): &&(String, String)| !name.starts_with('-') && name != "help";
+        self.listed.iter().filter(is_command)
+    }
+
+    /// Options and arguments.
+    fn options(&self) -> impl Iterator<Item = &(String, String)> {
+        let is_option = |(name, _): &&(String, String)| name.starts_with(['-', '<', '[']);
+        self.listed.iter().filter(is_option)
+    }
+}
+
+/// The tables of all commands by name. What is common to all is on top; what an earlier command says at length
+/// is a link.
+fn tables_of_commands() -> BTreeMap<String, String> {
+    const LONG: usize = 70;
+    let all = Help::of("pilum");
+    let mut top = "| command | |\n|---|---|\n".to_owned();
+    for (name, text) in all.commands() {
+        writeln!(top, "| [`{name}`](#pilum-{name}) | {text} |").unwrap();
+    }
+    top += "\n| option of every command | |\n|---|---|\n";
+    for (name, text) in all.options() {
+        writeln!(top, "| `{name}` | {text} |").unwrap();
+    }
+    let of_all: BTreeSet<&str> = all.options().map(|(name, _)| name.as_str()).collect();
+    let mut tables = BTreeMap::from([("pilum".to_owned(), top)]);
+    let mut first: BTreeMap<(String, String), &str> = BTreeMap::new();
+    for (command, _) in all.commands() {
+        let help = Help::of(command);
+        let mut table = format!("| `{}` | |\n|---|---|\n", help.usage);
+        for (name, text) in help.options() {
+            if of_all.contains(name.as_str()) {
+                continue;
+            }
+            let option = (name.clone(), text.clone());
+            match first.get(&option).filter(|_| text.len() > LONG) {
+                Some(other) => writeln!(table, "| `{name}` | as [`{other}`](#pilum-{other}) |"),
+                None => writeln!(table, "| `{name}` | {text} |"),
+            }
+            .unwrap();
+            first.entry(option).or_insert(command);
+        }
+        tables.insert(command.clone(), table);
+    }
+    tables
 }
 
 #[test]
@@ -434,17 +605,10 @@ fn commands_are_those_of_the_program() {
         .map(|(_, name)| name)
         .collect();
     let mut wanted = vec!["pilum".to_owned()];
-    wanted.extend(commands());
+    wanted.extend(Help::of("pilum").commands().map(|(name, _)| name.clone()));
     assert_eq!(listed, wanted, "commands of {}", path.display());
-    let help = |name: &str| {
-        let help = match name {
-            "pilum" => printed(&["--help"]),
-            name => printed(&["help", name]),
-        };
-        let lines: Vec<_> = help.lines().map(str::trim_end).collect();
-        format!("```text\n{}\n```\n", lines.join("\n").trim_end())
-    };
-    bless(&path, &filled(&text, "help", help));
+    let tables = tables_of_commands();
+    bless(&path, &filled(&text, "help", |name| tables[name].clone()));
 }
 
 /// The checks, from the program's list.

@@ -15,7 +15,7 @@ enum Point {
 use Point::{CannotTell, Refuses};
 
 /// The fixture, the check that must fail, how, and what a run in the same process does.
-const GALLERY: [(&str, &str, &str, Point); 84] = [
+const GALLERY: [(&str, &str, &str, Point); 83] = [
     (
         "bad_init_zero",
         "initial-states-are-written",
@@ -724,10 +724,10 @@ fn a_reference_of_one_unit_is_settled_by_a_parameter_or_a_sentence() {
              #define AT_END travel += fabs(increment[0]) * log1p(fabs(end[0]) / {reference});\n{more}"
         )
     };
-    let parameter = "#define SECOND {{.struct_size = PARAMETER_SIZE, .flags = PILUM_P_OPEN_LOWER, \
+    let parameter = "#define SECOND {.struct_size = PARAMETER_SIZE, .flags = PILUM_P_OPEN_LOWER, \
                      .id = \"reference\", .symbol = \"p_r\", .unit = \"kPa\", .doc = \"Reference.\", \
                      .default_value = 1.0, .lower = 0.0, .upper = INFINITY, .usual_lower = 0.1, \
-                     .usual_upper = 1e3}}";
+                     .usual_upper = 1e3}";
     let id = "units-belong-together";
     for (name, definitions, outcome, says) in [
         (

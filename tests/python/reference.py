@@ -13,10 +13,10 @@ import pilum
 
 TOP = """# The Python package
 
-*For whoever looks something up: all public names of `pilum`. This page is written from the package by a test.*
+*For users of the package: all public names of `pilum`.*
 
 Units are kN, m, kPa, angles in degrees; tension and opening are positive, shear strains are γ = 2ε.
-[Keys of a case](../reference/case.md) and [of a driver](../reference/driver.md) are those of dictionaries too.
+Dictionaries have the keys of [cases](../reference/case.md) and [drivers](../reference/driver.md).
 """
 
 ORDER = [
@@ -103,6 +103,7 @@ def page() -> str:
     parts = [TOP]
     listed = [name for _, names in ORDER for name in names]
     assert sorted(listed) == sorted(pilum.__all__), set(listed) ^ set(pilum.__all__)
+    explained: dict[tuple[str, str], str] = {}
     for title, names in ORDER:
         parts.append(f"## {title}\n")
         for name in names:
@@ -112,9 +113,15 @@ def page() -> str:
             parts.append(f"### `{call}`\n\n{doc(thing)}\n")
             if isinstance(thing, type):
                 rows = [*attributes(thing), *members(thing)]
+                # Members that an earlier class explains alike.
+                same = [row for row in rows if row in explained]
+                if len(same) > 1:
+                    rows = [row for row in rows if row not in same]
+                    rows.append(("`, `".join(member for member, _ in same), f"As of `{explained[same[0]]}`."))
                 if rows:
                     parts.append("| | |\n|---|---|")
                     for member, text in rows:
+                        explained.setdefault((member, text), name)
                         cell = text.replace("\n\n", "<br>").replace("|", "\\|")
                         parts.append(f"| `{member}` | {cell} |")
                     parts.append("")

@@ -42,40 +42,40 @@ pub struct Calibration {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CalibrationFile {
-    /// Title of the calibration.
+    /// Title.
     #[serde(default)]
     pub title: String,
-    /// The parameters that are looked for, by name.
+    /// Parameters to be found, by name.
     #[schemars(with = "BTreeMap<String, FreeInput>")]
     pub free: Named<FreeInput>,
-    /// Parameters that have another value than in the files of the tests, by name.
+    /// Parameters with another value than in the files of the tests, by name.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, FixedInput>")]
     pub fixed: Named<FixedInput>,
     /// The tests.
     pub test: Vec<TestInput>,
-    /// Groups of parameters that are fitted one after the other; all at once if left out.
+    /// Groups of parameters, fitted one after the other; default: all at once.
     #[serde(default)]
     pub stage: Vec<StageInput>,
-    /// How many places the search starts from: the given one, and others spread over the ranges; 8 if left
-    /// out, 2 if a test is a case.
+    /// Number of starts of the search: the given one, and others over the ranges; default 8, with cases
+    /// 2.
     #[schemars(with = "Option<usize>", range(min = 1))]
     pub starts: Option<Spanned<usize>>,
-    /// Seed of these places; the same number gives the same places.
+    /// Seed of the starts.
     #[serde(default)]
     pub seed: u64,
-    /// Whether the `noise` of curves is known, or only its proportions.
+    /// Meaning of the `noise` of curves; default `estimated`.
     #[serde(default)]
     pub variance: Variance,
-    /// Probability with which an interval holds the true value.
+    /// Probability that an interval holds the true value.
     #[serde(default = "confidence")]
     #[schemars(with = "f64", extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub confidence: Spanned<f64>,
-    /// Follow the profile of each parameter: the best sum of squares for values next to the best one.
+    /// Compute the profile of each parameter: the best sum of squares for values near the best one.
     #[serde(default = "yes")]
     pub profiles: bool,
-    /// Step of differences, relative to a parameter's range or, on a logarithmic scale, to itself; 1e-4
-    /// if left out, with cases the root of the loosest force tolerance.
+    /// Step of differences over a parameter's range, on a logarithmic scale over its value; default
+    /// 1e-4, with cases the root of the loosest force tolerance.
     #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0, "maximum" = 0.1))]
     pub difference: Option<Spanned<f64>>,
 }
@@ -92,10 +92,10 @@ fn yes() -> bool {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Variance {
-    /// The noise of curves says their proportions; its size is estimated from the residuals.
+    /// Proportions; the size is estimated from the residuals.
     #[default]
     Estimated,
-    /// The noise of curves is their standard deviation.
+    /// Standard deviation.
     Given,
 }
 
@@ -103,9 +103,9 @@ pub enum Variance {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Scale {
-    /// As it is.
+    /// Its value.
     Linear,
-    /// By its logarithm.
+    /// Its logarithm.
     Log,
 }
 
@@ -113,24 +113,23 @@ pub enum Scale {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FreeInput {
-    /// Id of the law's parameter, if it is not the name.
+    /// Id of the law's parameter; default: the name.
     #[schemars(with = "Option<String>")]
     pub parameter: Option<Spanned<String>>,
-    /// Cases: the tables under `[laws]` that it belongs to; without them it belongs to drivers alone, which have
-    /// one law each, and goes there before names that have some.
+    /// Cases: its tables under `[laws]`; without them it belongs to drivers alone.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub laws: Vec<Spanned<String>>,
-    /// Start of the search; by default the value in the first test that has it.
+    /// Start of the search; default: its value in the first test.
     #[schemars(with = "Option<f64>")]
     pub start: Option<Spanned<f64>>,
-    /// Least value; the law's own bound if left out.
+    /// Least value; default: the law's bound.
     #[schemars(with = "Option<f64>")]
     pub min: Option<Spanned<f64>>,
-    /// Greatest value; the law's own bound if left out.
+    /// Greatest value; default: the law's bound.
     #[schemars(with = "Option<f64>")]
     pub max: Option<Spanned<f64>>,
-    /// How it is counted; `log` if left out and the law takes only values above 0.
+    /// Scale; default `log` if the law takes only values above 0.
     #[schemars(with = "Option<Scale>")]
     pub scale: Option<Spanned<Scale>>,
 }
@@ -139,11 +138,10 @@ pub struct FreeInput {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FixedInput {
-    /// Id of the law's parameter, if it is not the name.
+    /// Id of the law's parameter; default: the name.
     #[schemars(with = "Option<String>")]
     pub parameter: Option<Spanned<String>>,
-    /// Cases: the tables under `[laws]` that it belongs to; without them it belongs to drivers alone, and goes there
-    /// before names that have some.
+    /// Cases: its tables under `[laws]`; without them it belongs to drivers alone.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub laws: Vec<Spanned<String>>,
@@ -162,25 +160,25 @@ pub struct TestInput {
     /// A driver file, relative to this one.
     #[schemars(with = "Option<PathBuf>")]
     pub driver: Option<Spanned<PathBuf>>,
-    /// A case file or its folder, relative to this one, instead of a driver.
+    /// Instead of a driver: a case file or its folder, relative to this one.
     #[schemars(with = "Option<PathBuf>")]
     pub case: Option<Spanned<PathBuf>>,
-    /// The variant of that file.
+    /// Variant of that file.
     #[schemars(with = "Option<String>")]
     pub variant: Option<Spanned<String>>,
-    /// Drivers: the table under `[laws]` of cases that its law is the one of. Names with `laws` belong to it if that is
-    /// among them; to every driver with such a parameter, if left out.
+    /// Drivers: the table under `[laws]` of cases that has the same law. Names with this table in `laws`
+    /// belong to it; default: to every driver with the parameter.
     #[schemars(with = "Option<String>")]
     pub stands_for: Option<Spanned<String>>,
-    /// The test is predicted with what the others give, not fitted.
+    /// Predict the test from the others, do not fit it.
     #[serde(default)]
     pub predict: bool,
-    /// How much its squared residuals count. It moves the values found, and is no information: equal weights change
-    /// no interval.
+    /// Factor of its squared residuals. It moves the values found, but is no information: equal weights
+    /// change no interval.
     #[serde(default = "weight")]
     #[schemars(with = "f64", extend("exclusiveMinimum" = 0))]
     pub weight: Spanned<f64>,
-    /// Curves that were measured in it.
+    /// Measured curves.
     pub curve: Vec<CurveInput>,
 }
 
@@ -192,47 +190,46 @@ fn weight() -> Spanned<f64> {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CurveInput {
-    /// Computed column along the horizontal axis, which only grows or only falls: what the test imposes.
+    /// Computed column that the test imposes: it only grows or only falls.
     #[schemars(with = "String")]
     pub x: Spanned<String>,
-    /// Computed column along the vertical axis, whose differences to the measured values are squared.
+    /// Computed column that is compared.
     #[schemars(with = "String")]
     pub y: Spanned<String>,
-    /// Text of the horizontal axis.
+    /// Text of this axis.
     pub x_label: Option<String>,
-    /// Text of the vertical axis.
+    /// Text of this axis.
     pub y_label: Option<String>,
-    /// Drivers: only this segment, from 1.
+    /// Drivers: only this segment.
     #[schemars(with = "Option<usize>", range(min = 1))]
     pub segment: Option<Spanned<usize>>,
-    /// Cases: the phase; the last one if left out.
+    /// Cases: the phase; default: the last one.
     #[schemars(with = "Option<String>")]
     pub phase: Option<Spanned<String>>,
-    /// The measured points, in the unit of the computed columns after their scale.
+    /// Measured points, after their scale in the unit of the computed columns.
     #[schemars(with = "MeasuredInput")]
     pub measured: Spanned<MeasuredInput>,
-    /// Standard deviation of measured values, in the unit of `y`; 1 % of the largest if neither this nor
-    /// `relative_noise` is given.
+    /// Standard deviation of measured values, in the unit of `y`; default 1 % of the largest, without
+    /// `relative_noise`.
     #[schemars(with = "Option<f64>", range(min = 0))]
     pub noise: Option<Spanned<f64>>,
-    /// A part of it that grows with the value measured.
+    /// Part of the noise that grows with the measured value.
     #[schemars(with = "Option<f64>", range(min = 0))]
     pub relative_noise: Option<Spanned<f64>>,
-    /// Offset of every measured `x` (slack, or a wrong zero), fitted together with the parameters. Before its start the
-    /// computed curve then keeps its first value. 0 if left out.
+    /// Offset of measured `x` (slack, wrong zero), fitted with the parameters; default 0.
     #[schemars(with = "Option<ReadingInput>")]
     pub offset_x: Option<Spanned<ReadingInput>>,
-    /// Factor on every measured `x`, applied before the offset; fitted likewise. 1 if left out.
+    /// Factor on measured `x` before the offset, fitted likewise; default 1.
     #[schemars(with = "Option<ReadingInput>")]
     pub scale_x: Option<Spanned<ReadingInput>>,
-    /// Offset of every measured `y`, fitted likewise. 0 if left out.
+    /// Offset of measured `y`, fitted likewise; default 0.
     #[schemars(with = "Option<ReadingInput>")]
     pub offset_y: Option<Spanned<ReadingInput>>,
-    /// Factor on every measured `y`, applied before the offset; fitted likewise. 1 if left out.
+    /// Factor on measured `y` before the offset, fitted likewise; default 1.
     #[schemars(with = "Option<ReadingInput>")]
     pub scale_y: Option<Spanned<ReadingInput>>,
-    /// How much its squared residuals count. It moves the values found, and is no information: equal weights change
-    /// no interval.
+    /// Factor of its squared residuals. It moves the values found, but is no information: equal weights
+    /// change no interval.
     #[serde(default = "weight")]
     #[schemars(with = "f64", extend("exclusiveMinimum" = 0))]
     pub weight: Spanned<f64>,
@@ -246,7 +243,7 @@ pub struct ReadingInput {
     pub min: f64,
     /// Greatest value.
     pub max: f64,
-    /// Where the search starts; no offset and no scale, or the nearest that there may be, if left out.
+    /// Start of the search; default: nearest to no offset and no scale.
     pub start: Option<f64>,
 }
 
@@ -273,7 +270,7 @@ pub struct StageInput {
     /// The parameters.
     #[schemars(with = "Vec<String>")]
     pub free: Vec<Spanned<String>>,
-    /// The tests that they are fitted to; all that are not predicted, if left out.
+    /// Tests for the fit; default: all that are not predicted.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub tests: Vec<Spanned<String>>,

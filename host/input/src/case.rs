@@ -147,27 +147,27 @@ impl Case {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CaseFile {
-    /// Title of the case.
+    /// Title.
     #[serde(default)]
     pub title: String,
     /// Kinematics of the plane.
     pub analysis: Analysis,
-    /// Folders with law libraries, relative to the case file.
+    /// Folders with law libraries, relative to the file.
     #[serde(default)]
     #[schemars(with = "Vec<PathBuf>")]
     pub law_path: Vec<Spanned<PathBuf>>,
     /// The mesh.
     pub mesh: MeshInput,
-    /// Laws with their parameters, by a name that groups refer to.
+    /// Laws and their parameters, by a name for groups.
     #[schemars(with = "BTreeMap<String, LawInput>")]
     pub laws: Named<LawInput>,
-    /// Element groups, by a name that regions refer to.
+    /// Element groups, by a name for regions.
     #[schemars(with = "BTreeMap<String, GroupInput>")]
     pub groups: Named<GroupInput>,
     /// Ground water; none if left out.
     #[schemars(with = "Option<WaterInput>")]
     pub water: Option<Spanned<WaterInput>>,
-    /// Displacements held at zero throughout.
+    /// Displacements held at zero.
     #[serde(default)]
     pub supports: Vec<SupportInput>,
     /// Loading phases, in order.
@@ -177,8 +177,7 @@ pub struct CaseFile {
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, ProbeInput>")]
     pub probes: Named<ProbeInput>,
-    /// A pile: its forces, friction and settlement are written for every increment, and its resistance at
-    /// the end.
+    /// A pile: forces, friction and settlement of every increment; resistance at the end.
     pub pile: Option<PileInput>,
     /// Curves of probes, drawn when the run ends.
     #[serde(default, rename = "figure")]
@@ -190,12 +189,11 @@ pub struct CaseFile {
     /// Output.
     #[serde(default)]
     pub output: Output,
-    /// Relative error of the probes that the run may have; settings that reach it are then found
-    /// by a study before the run.
+    /// Relative error that the probes may have: a study before the run finds settings that reach it.
     #[serde(default, deserialize_with = "accuracy")]
     #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0, "maximum" = 0.5))]
     pub accuracy: Option<Spanned<f64>>,
-    /// Whether the error of the mesh counts as part of `accuracy`: the mesh is then refined as well.
+    /// `accuracy` includes the error of the mesh: the mesh is refined as well.
     #[serde(default)]
     #[schemars(with = "Option<bool>")]
     pub accuracy_with_mesh: Option<Spanned<bool>>,
@@ -239,13 +237,13 @@ impl CaseFile {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeshInput {
-    /// Instead of a grid: a file of Gmsh (4.1, 4.0, 2.0 to 2.2), relative to the case file.
+    /// Instead of a grid: a file of Gmsh, relative to the case file.
     #[schemars(with = "Option<PathBuf>")]
     pub file: Option<Spanned<PathBuf>>,
-    /// Metres in a unit of that file; 1 if left out.
+    /// Metres in a unit of that file; default 1.
     #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0))]
     pub scale: Option<Spanned<f64>>,
-    /// Where columns and rows start; (0, 0) if left out.
+    /// Start of columns and rows; default (0, 0).
     #[schemars(with = "Option<[f64; 2]>")]
     pub origin: Option<Spanned<[f64; 2]>>,
     /// Columns, in the direction of x (r).
@@ -254,7 +252,7 @@ pub struct MeshInput {
     /// Rows, in the direction of y (z).
     #[schemars(with = "Option<Vec<PartInput>>")]
     pub rows: Option<Spanned<Vec<Spanned<PartInput>>>>,
-    /// Which group an element belongs to; later regions override earlier ones.
+    /// Groups of elements; later regions override earlier ones.
     #[serde(default, rename = "region")]
     pub regions: Vec<RegionInput>,
     /// Named lines.
@@ -273,11 +271,11 @@ pub struct MeshInput {
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PartInput {
-    /// How many.
+    /// Number.
     pub n: usize,
     /// Coordinate where they end.
     pub to: f64,
-    /// Size of each divided by the size of the one before.
+    /// Size of each over the size of the one before.
     #[serde(default = "one")]
     pub ratio: f64,
 }
@@ -291,14 +289,14 @@ fn one() -> f64 {
 #[schemars(transform = schema::radius_and_axis)]
 #[serde(deny_unknown_fields)]
 pub struct RegionInput {
-    /// The group its elements belong to.
+    /// Group of the elements.
     #[schemars(with = "String")]
     pub group: Spanned<String>,
-    /// Extent in x (r); everything if left out.
+    /// Extent in x (r); default: all.
     #[serde(alias = "r")]
     #[schemars(with = "Option<[f64; 2]>")]
     pub x: Option<Spanned<[f64; 2]>>,
-    /// Extent in y (z); everything if left out.
+    /// Extent in y (z); default: all.
     #[serde(alias = "z")]
     #[schemars(with = "Option<[f64; 2]>")]
     pub y: Option<Spanned<[f64; 2]>>,
@@ -337,44 +335,45 @@ pub struct LawInput {
     /// Id of the law.
     #[schemars(with = "String")]
     pub law: Spanned<String>,
-    /// SHA-256 that its library must have, in hexadecimal digits.
+    /// SHA-256 that the law's library must have, in hexadecimal digits.
     #[schemars(with = "Option<String>")]
     pub sha256: Option<Spanned<String>>,
-    /// Program that its library is made for, if not for the contract; or another law as its source.
+    /// Program that the law's library is made for, if not for the contract; or another law as its
+    /// source.
     #[schemars(with = "Option<Route>")]
     pub adapter: Option<Spanned<Route>>,
-    /// That library.
+    /// That library, relative to the file.
     #[schemars(with = "Option<PathBuf>")]
     pub library: Option<Spanned<PathBuf>>,
-    /// What describes it.
+    /// Its sidecar, or description.
     #[schemars(with = "Option<PathBuf>")]
     pub sidecar: Option<Spanned<PathBuf>>,
-    /// Call it in this process.
+    /// Call the law in this process.
     #[schemars(with = "Option<bool>")]
     pub in_process: Option<Spanned<bool>>,
-    /// Write the arguments of one call here.
+    /// File for the arguments of one call.
     #[schemars(with = "Option<PathBuf>")]
     pub record: Option<Spanned<PathBuf>>,
-    /// What becomes of routines that it calls and nobody supplies.
+    /// Routines that the library calls and nobody supplies.
     #[schemars(with = "Option<Externals>")]
     pub externals: Option<Spanned<Externals>>,
-    /// What becomes of its scratch files.
+    /// Scratch files of the library.
     #[schemars(with = "Option<Scratch>")]
     pub scratch: Option<Spanned<Scratch>>,
-    /// UDSM: how its stiffness is in memory; `columns`, as Fortran has it, if left out.
+    /// UDSM: order of its stiffness in memory; default `columns`.
     #[schemars(with = "Option<Order>")]
     pub tangent_order: Option<Spanned<Order>>,
-    /// Shear zone: its thickness, m. `law` is then a law of solids, or another table of laws.
+    /// Shear zone: its thickness, m. `law` is a law of solids, or a table of `laws`.
     #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0))]
     pub thickness: Option<Spanned<f64>>,
-    /// Shear zone: stress along it and out of plane over the normal traction at the start; 1 if left out.
+    /// Shear zone: initial stress along it and out of plane over the normal traction; default 1.
     #[schemars(with = "Option<f64>", range(min = 0))]
     pub lateral_ratio: Option<Spanned<f64>>,
     /// Its parameters.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, ParameterValue>")]
     pub parameters: ParameterTable,
-    /// Initial values of internal variables, overriding those of the law.
+    /// Initial internal variables, instead of the law's.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, f64>")]
     pub initial: Named<f64>,
@@ -421,43 +420,43 @@ impl LawInput {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GroupInput {
-    /// What the elements do.
+    /// Kind of element.
     pub formulation: Formulation,
-    /// The law, by its name under `laws`; phases may swap it.
+    /// Name under `laws`; phases may swap it.
     #[schemars(with = "String")]
     pub law: Spanned<String>,
-    /// Integration points of the law; the default depends on the formulation.
+    /// Integration points; default: solids `projected`, thin layers `full`, zero thickness `nodes`.
     #[schemars(with = "Option<Integration>")]
     pub integration: Option<Spanned<Integration>>,
-    /// Zero thickness: the line along which the elements are inserted.
+    /// Zero thickness: the line of the elements.
     #[schemars(with = "Option<String>")]
     pub line: Option<Spanned<String>>,
-    /// Zero thickness: what becomes of the ends of that line; `open` if left out.
+    /// Zero thickness: ends of that line on the model's outline; default `open`.
     #[schemars(with = "Option<Ends>")]
     pub ends: Option<Spanned<Ends>>,
-    /// Thin layer: direction across the layer; the shorter side if left out.
+    /// Thin layer: direction across it; default: the shorter side.
     #[schemars(with = "Option<Axis>")]
     pub normal: Option<Spanned<Axis>>,
     /// Thin layer with an interface law: elasticity along the layer.
     #[schemars(with = "Option<InPlane>")]
     pub in_plane: Option<Spanned<InPlane>>,
-    /// Effective stress before the first phase, tension positive: components, or earth pressure at rest.
+    /// Effective stress before the first phase, tension positive.
     #[schemars(with = "Option<StressInput>")]
     pub initial_stress: Option<Spanned<StressInput>>,
-    /// Weight of the ground above the water, kN/m³; 0 if left out.
+    /// Unit weight above the water, kN/m³; default 0.
     #[schemars(with = "Option<f64>")]
     pub unit_weight: Option<Spanned<f64>>,
-    /// Weight of the ground below the water, kN/m³; `unit_weight` if left out.
+    /// Unit weight below the water, kN/m³; default `unit_weight`.
     #[schemars(with = "Option<f64>")]
     pub saturated_unit_weight: Option<Spanned<f64>>,
-    /// Water fills the pores below the water table, and laws see effective stresses; true if left out.
+    /// Water fills the pores below the water table; default true. Laws see effective stresses.
     pub pore_water: Option<bool>,
-    /// It is there from the start; true if left out. Phases activate and deactivate.
+    /// Present from the start; default true. Phases activate and deactivate.
     pub active: Option<bool>,
-    /// Whether pore water leaves freely; `drained` if left out.
+    /// Drainage of pore water; default `drained`.
     #[schemars(with = "Option<Drainage>")]
     pub drainage: Option<Spanned<Drainage>>,
-    /// Undrained: Poisson's ratio with the pore water; 0.495 if left out.
+    /// Undrained: Poisson's ratio with the pore water; default 0.495.
     #[schemars(with = "Option<f64>")]
     pub undrained_poisson_ratio: Option<Spanned<f64>>,
 }
@@ -466,9 +465,9 @@ pub struct GroupInput {
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum Ends {
-    /// The two sides come apart at an end on the model's outline.
+    /// The two sides come apart.
     Open,
-    /// They stay joined there.
+    /// They stay joined.
     Joined,
 }
 
@@ -515,57 +514,56 @@ pub struct PhaseInput {
     /// Number of equal increments.
     #[schemars(with = "usize")]
     pub increments: Spanned<usize>,
-    /// How long it takes, in the unit of time of the laws' parameters; 1 if left out.
+    /// Duration, in the laws' unit of time; default 1.
     #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0))]
     pub time: Option<Spanned<f64>>,
     /// Laws of groups from this phase on.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, String>")]
     pub laws: Named<String>,
-    /// Groups that are there from this phase on: solids free of stress, interfaces with the stress
-    /// next to them.
+    /// Groups present from this phase on: solids free of stress, interfaces with the adjacent stress.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub activate: Vec<Spanned<String>>,
-    /// Groups that are gone from this phase on; what they carried is released in its course. An interface
-    /// goes with the ground next to it, and is named as well. One group at least stays.
+    /// Groups absent from this phase on, one at least stays: the phase releases their forces. Name the
+    /// interfaces of removed ground, too.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub deactivate: Vec<Spanned<String>>,
-    /// Unit weights of groups at the end of the phase, above and below the water, kN/m³.
+    /// Unit weights of groups at its end, above and below the water, kN/m³.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, f64>")]
     pub unit_weight: Named<f64>,
-    /// Water table at the end of the phase.
+    /// Water table at its end.
     #[schemars(with = "Option<WaterChange>")]
     pub water: Option<Spanned<WaterChange>>,
-    /// Whether pore water of groups leaves freely from this phase on. Pressure that is left goes in the
-    /// phase's course.
+    /// Drainage of groups from this phase on. Excess pressure of drained groups goes in the course of
+    /// the phase.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, Drainage>")]
     pub drainage: Named<Drainage>,
-    /// Lines whose nodes move alike from this phase on to the end, without turning; where a line reaches the
-    /// axis of symmetry, not radially. No later phase gives it up.
+    /// Lines whose nodes move alike, without turning, in this and all later phases; not radially if a
+    /// line reaches the axis.
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub rigid: Vec<Spanned<String>>,
-    /// Pairs of the share of its time (0 to 1) and factor on what this phase changes of loads and displacements; straight
-    /// from 0 to 1 if left out.
+    /// Pairs of the share of its time (0 to 1) and the factor on its changes; default: straight from 0
+    /// to 1.
     #[schemars(with = "Option<Vec<[f64; 2]>>")]
     pub course: Option<Spanned<Vec<[f64; 2]>>>,
-    /// Forces, as totals at the end of the phase.
+    /// Forces at its end.
     #[serde(default)]
     pub force: Vec<ForceInput>,
-    /// Displacements are counted from the start of this phase.
+    /// Count displacements from the start of this phase.
     #[serde(default)]
     pub reset_displacements: bool,
-    /// Prescribed displacements, as totals at the end of the phase.
+    /// Prescribed displacements at its end, m.
     #[serde(default)]
     pub displacement: Vec<DisplacementInput>,
-    /// Prescribed displacements given up from this phase on.
+    /// Displacements given up from this phase on.
     #[serde(default)]
     pub free: Vec<FreeInput>,
-    /// Pressures, as totals at the end of the phase.
+    /// Pressures at its end, kPa.
     #[serde(default)]
     pub pressure: Vec<PressureInput>,
 }
@@ -604,7 +602,7 @@ pub struct PressureInput {
     /// The line.
     #[schemars(with = "String")]
     pub line: Spanned<String>,
-    /// Towards the body positive; a number, or values over the height.
+    /// Positive towards the body, kPa.
     #[schemars(with = "ProfileInput")]
     pub value: Spanned<ProfileInput>,
 }
@@ -631,29 +629,28 @@ pub struct ForceInput {
 #[schemars(transform = schema::radius_and_axis)]
 #[serde(deny_unknown_fields)]
 pub struct ProbeInput {
-    /// Over the nodes of this line.
+    /// Line of nodes.
     #[schemars(with = "Option<String>")]
     pub line: Option<Spanned<String>>,
-    /// Over the integration points of this group; with a line, only its forces.
+    /// Group of integration points; with a line, its forces.
     #[schemars(with = "Option<String>")]
     pub group: Option<Spanned<String>>,
-    /// On a line: `displacement_…`, `reaction_…`, with a group `force_…`. In a group: a stress, strain,
-    /// traction, jump or internal variable; with water or undrained ground also `pore_pressure`,
-    /// `excess_pore_pressure` (compression positive) and `total_stress_…`, kPa.
+    /// On a line `displacement_…`, `reaction_…`, with a group `force_…`. In a group a stress, strain,
+    /// traction, jump, internal variable, `pore_pressure`, `excess_pore_pressure` or `total_stress_…`.
     #[schemars(with = "Option<String>")]
     pub quantity: Option<Spanned<String>>,
-    /// How values become one; `sum` for forces, else `mean`.
+    /// How values become one; default `sum` for forces, else `mean`.
     pub reduce: Option<Reduce>,
-    /// Only points inside this extent (ends excluded).
+    /// Only points strictly inside this extent.
     #[serde(alias = "r")]
     pub x: Option<[f64; 2]>,
-    /// Only points inside this extent (ends excluded).
+    /// Only points strictly inside this extent.
     #[serde(alias = "z")]
     pub y: Option<[f64; 2]>,
     /// Factor.
     #[serde(default = "one")]
     pub scale: f64,
-    /// Instead of the above: a sum of other probes with factors.
+    /// Instead: a sum of earlier probes with factors.
     #[schemars(with = "Option<BTreeMap<String, f64>>")]
     pub combine: Option<Named<f64>>,
 }
@@ -662,18 +659,18 @@ pub struct ProbeInput {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PileInput {
-    /// The group of its elements, or several.
+    /// Group of its elements, or several.
     pub group: GroupNames,
-    /// Interface groups along its shaft, from the head to the toe.
+    /// Interface groups of its shaft, from head to toe.
     pub shaft: GroupNames,
-    /// Support of its base: an interface group, or the line along which it rests on the ground.
+    /// Base: an interface group, or its line on the ground.
     #[schemars(with = "String")]
     pub base: Spanned<String>,
-    /// The line of its head.
+    /// Line of its head.
     #[schemars(with = "String")]
     pub head: Spanned<String>,
-    /// Diameter (plane strain: width) for the criteria of its resistance, m; that of the base if left out:
-    /// twice the largest radius, in plane strain the extent in x.
+    /// Diameter (plane strain: width) for its resistance, m; default: twice the largest radius of the
+    /// base, in plane strain its extent in x.
     #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0))]
     pub diameter: Option<Spanned<f64>>,
 }
@@ -750,27 +747,27 @@ pub struct FigureInput {
     /// Name of the file, without `.svg`.
     #[schemars(with = "String")]
     pub name: Spanned<String>,
-    /// Title; the case's if left out.
+    /// Title; default: the case's.
     pub title: Option<String>,
-    /// Probe (of a cut: quantity of a point; along the pile: column of `pile.csv`) along the horizontal axis.
+    /// Horizontal axis: probe, quantity of a point, or column of `pile.csv`.
     #[schemars(with = "String")]
     pub x: Spanned<String>,
-    /// Text of the horizontal axis.
+    /// Text of this axis.
     pub x_label: Option<String>,
-    /// Probes (quantities, columns) along the vertical axis.
+    /// Vertical axis: the same, one or more.
     #[schemars(with = "Vec<String>")]
     pub y: Vec<Spanned<String>>,
-    /// Text of the vertical axis.
+    /// Text of this axis.
     pub y_label: Option<String>,
-    /// Only this phase; all if left out.
+    /// Only this phase; default: all.
     #[schemars(with = "Option<String>")]
     pub phase: Option<Spanned<String>>,
-    /// A cut: the integration points in it instead of probes.
+    /// Integration points of a cut, instead of probes.
     pub points: Option<CutInput>,
     /// Along the pile, instead of probes.
     #[schemars(with = "Option<AlongInput>")]
     pub along_pile: Option<Spanned<AlongInput>>,
-    /// Measured points, drawn as markers.
+    /// Measured points, as markers.
     pub measured: Option<MeasuredTables>,
 }
 
@@ -788,7 +785,7 @@ impl FigureInput {
 #[schemars(transform = schema::radius_and_axis)]
 #[serde(deny_unknown_fields)]
 pub struct CutInput {
-    /// Group; by default all.
+    /// Group; default: all.
     #[schemars(with = "Option<String>")]
     pub group: Option<Spanned<String>>,
     /// Extent in x (r).
@@ -797,10 +794,10 @@ pub struct CutInput {
     /// Extent in y (z).
     #[serde(alias = "z")]
     pub y: Option<[f64; 2]>,
-    /// After these increments of the phase, a curve for each; after the last one if left out.
+    /// A curve after each of these increments of the phase; default: the last one.
     #[serde(default)]
     pub increments: Vec<usize>,
-    /// Factor of what stands along the vertical axis.
+    /// Factor of the vertical axis.
     #[serde(default = "one")]
     pub scale: f64,
 }
@@ -809,7 +806,7 @@ pub struct CutInput {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AlongInput {
-    /// After these increments of the phase, a curve for each; after the last one if left out.
+    /// A curve after each of these increments of the phase; default: the last one.
     #[serde(default)]
     pub increments: Vec<usize>,
 }
@@ -822,23 +819,23 @@ pub struct MeasuredTables(pub Vec<MeasuredInput>);
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeasuredInput {
-    /// The file, relative to the case file. Its first line names the columns; `,`, `;` or a tab
-    /// between them; lines that start with `#` and rows without a value are passed over.
+    /// The file, relative to this one. Columns named in the first line, separated by `,`, `;` or tabs;
+    /// lines with `#` and rows without a value do not count.
     #[schemars(with = "PathBuf")]
     pub file: Spanned<PathBuf>,
-    /// Column of what stands along the horizontal axis.
+    /// Column for the horizontal axis.
     #[schemars(with = "String")]
     pub x: Spanned<String>,
-    /// Column of what stands along the vertical axis.
+    /// Column for the vertical axis.
     #[schemars(with = "String")]
     pub y: Spanned<String>,
     /// Name in the legend.
     #[serde(default = "measured")]
     pub label: String,
-    /// Factor of the horizontal values.
+    /// Factor of its values.
     #[serde(default = "one")]
     pub x_scale: f64,
-    /// Factor of the vertical values.
+    /// Factor of its values.
     #[serde(default = "one")]
     pub y_scale: f64,
 }

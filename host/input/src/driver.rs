@@ -40,65 +40,65 @@ pub(crate) struct DriverFile {
     /// Id of the law.
     #[schemars(with = "String")]
     law: Spanned<String>,
-    /// SHA-256 of the law's library; another one is refused.
+    /// SHA-256 that the law's library must have, in hexadecimal digits.
     #[schemars(with = "Option<String>")]
     sha256: Option<Spanned<String>>,
     /// Program that the law's library is made for, if not for the contract; or another law as its
     /// source.
     #[schemars(with = "Option<Route>")]
     adapter: Option<Spanned<Route>>,
-    /// That library.
+    /// That library, relative to the file.
     #[schemars(with = "Option<PathBuf>")]
     library: Option<Spanned<PathBuf>>,
-    /// What describes it.
+    /// Its sidecar, or description.
     #[schemars(with = "Option<PathBuf>")]
     sidecar: Option<Spanned<PathBuf>>,
-    /// Call it in this process.
+    /// Call the law in this process.
     #[schemars(with = "Option<bool>")]
     in_process: Option<Spanned<bool>>,
-    /// Write the arguments of one call here.
+    /// File for the arguments of one call.
     #[schemars(with = "Option<PathBuf>")]
     record: Option<Spanned<PathBuf>>,
-    /// What becomes of routines that it calls and nobody supplies.
+    /// Routines that the library calls and nobody supplies.
     #[schemars(with = "Option<Externals>")]
     externals: Option<Spanned<Externals>>,
-    /// What becomes of its scratch files.
+    /// Scratch files of the library.
     #[schemars(with = "Option<Scratch>")]
     scratch: Option<Spanned<Scratch>>,
-    /// UDSM: how its stiffness is in memory; `columns`, as Fortran has it, if left out.
+    /// UDSM: order of its stiffness in memory; default `columns`.
     #[schemars(with = "Option<Order>")]
     tangent_order: Option<Spanned<Order>>,
-    /// Shear zone: its thickness, m. `law` is then a law of solids, or one of `laws`.
+    /// Shear zone: its thickness, m. `law` is a law of solids, or a table of `laws`.
     #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0))]
     thickness: Option<Spanned<f64>>,
-    /// Shear zone: stress along it and out of plane over the normal traction at the start; 1 if left out.
+    /// Shear zone: initial stress along it and out of plane over the normal traction; default 1.
     #[schemars(with = "Option<f64>", range(min = 0))]
     lateral_ratio: Option<Spanned<f64>>,
-    /// Shear zone: the law that fills it, where its library is made for another program.
+    /// Shear zone: the law that fills it.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, LawInput>")]
     laws: Named<LawInput>,
-    /// Title of the driver.
+    /// Title.
     #[serde(default)]
     title: String,
     /// Folders with law libraries, relative to the file.
     #[serde(default)]
     #[schemars(with = "Vec<PathBuf>")]
     law_path: Vec<Spanned<PathBuf>>,
-    /// Hypothesis: what is led, and its components.
+    /// Hypothesis, with its components.
     #[schemars(with = "schema::HypothesisName")]
     hypothesis: Spanned<String>,
-    /// Parameters of the law.
+    /// Its parameters.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, ParameterValue>")]
     parameters: ParameterTable,
-    /// The initial state; 0 where nothing is given.
+    /// Initial state; default 0.
     #[schemars(with = "Option<Initial>")]
     initial: Option<Spanned<Initial>>,
-    /// The path, segment after segment.
+    /// The path.
     #[serde(default)]
     segment: Vec<SegmentTable>,
-    /// Curves of columns of the table.
+    /// Curves of columns.
     #[serde(default, rename = "figure")]
     figures: Vec<FigureInput>,
 }
@@ -142,13 +142,13 @@ fn refuse_unused(tables: LawTables<'_>, entry: &LawInput) -> Result<(), Error> {
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Initial {
-    /// Traction of an interface, kPa, by component `n`, `t`.
+    /// Traction of an interface, kPa.
     #[schemars(with = "Option<schema::Components<f64>>")]
     traction: Option<Spanned<Named<f64>>>,
-    /// Stress of a solid, kPa, by component `11` to `23`.
+    /// Stress of a solid, kPa.
     #[schemars(with = "Option<schema::Components<f64>>")]
     stress: Option<Spanned<Named<f64>>>,
-    /// Internal variables of the law, by id.
+    /// Internal variables, by id.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, f64>")]
     internal: Named<f64>,
@@ -161,10 +161,10 @@ struct SegmentTable {
     /// Number of equal increments.
     #[schemars(with = "i64", range(min = 1))]
     increments: Spanned<i64>,
-    /// How long it takes, in the unit of time of the law's parameters; an increment takes 1 if left out.
+    /// Duration, in the law's unit of time; default: 1 for each increment.
     #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0))]
     time: Option<Spanned<f64>>,
-    /// How each component is led; one without control keeps its traction or stress.
+    /// Control of components; one without keeps its traction or stress.
     #[schemars(with = "schema::Components<ControlTable>")]
     control: IndexMap<Spanned<String>, Spanned<ControlTable>>,
 }
@@ -180,7 +180,7 @@ struct ControlTable {
     /// Interfaces: traction, kPa.
     #[schemars(with = "Option<f64>")]
     traction: Option<Spanned<f64>>,
-    /// Interfaces: the traction changes by −stiffness × jump, kPa/m.
+    /// Interfaces: the traction changes by −stiffness × jump since the start of the segment, kPa/m.
     #[schemars(with = "Option<f64>")]
     stiffness: Option<Spanned<f64>>,
     /// Solids: strain.

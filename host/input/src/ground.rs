@@ -17,7 +17,7 @@ use toml::Spanned;
 pub enum ProfileInput {
     /// The same everywhere.
     Number(f64),
-    /// Points (height, value), height rising: linear between, constant beyond.
+    /// Points (height, value), height rising.
     Points(Vec<[f64; 2]>),
     /// The same under the name of the height.
     Over(Over),
@@ -28,7 +28,7 @@ pub enum ProfileInput {
 #[schemars(transform = schema::height)]
 #[serde(deny_unknown_fields)]
 pub struct Over {
-    /// Points (height, value), height rising: linear between, constant beyond.
+    /// Points (height, value), height rising.
     #[serde(alias = "y")]
     pub z: Vec<[f64; 2]>,
 }
@@ -54,10 +54,10 @@ impl ProfileInput {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WaterInput {
-    /// Level of the water table, or points (x, level) from left to right.
+    /// Level, or points (x, level) from left to right.
     #[schemars(with = "LevelInput")]
     pub level: Spanned<LevelInput>,
-    /// Unit weight of the water, kN/m³.
+    /// Unit weight of water, kN/m³.
     #[serde(default = "of_water")]
     pub unit_weight: f64,
 }
@@ -66,7 +66,7 @@ pub struct WaterInput {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WaterChange {
-    /// Level of the water table at the end of the phase, or points (x, level) from left to right.
+    /// Level at the end of the phase, or points (x, level).
     #[schemars(with = "LevelInput")]
     pub level: Spanned<LevelInput>,
 }
@@ -135,22 +135,21 @@ pub struct StressInput {
     #[serde(rename = "stress_12", alias = "12")]
     #[schemars(with = "Option<ProfileInput>")]
     pub s12: Option<Spanned<ProfileInput>>,
-    /// At rest: what the horizontal effective stress is of the vertical one.
+    /// At rest: horizontal over vertical effective stress.
     #[schemars(with = "Option<ProfileInput>")]
     pub k_0: Option<Spanned<ProfileInput>>,
-    /// At rest: angle of friction in degrees, of which `k_0` of normally consolidated ground follows.
+    /// At rest, instead of `k_0`: angle of friction, degrees.
     #[schemars(with = "Option<ProfileInput>")]
     pub friction_angle: Option<Spanned<ProfileInput>>,
-    /// At rest: overconsolidation ratio; 1 if left out.
+    /// At rest: overconsolidation ratio; default 1.
     #[schemars(with = "Option<ProfileInput>")]
     pub ocr: Option<Spanned<ProfileInput>>,
-    /// At rest: pre-overburden pressure, kPa; 0 if left out.
+    /// At rest: pre-overburden pressure, kPa; default 0.
     #[schemars(with = "Option<ProfileInput>")]
     pub pop: Option<Spanned<ProfileInput>>,
-    /// At rest: Poisson's ratio of unloading; needed where `ocr` or `pop` is given.
+    /// At rest: Poisson's ratio of unloading, needed with `ocr` or `pop`.
     pub poisson_ratio: Option<f64>,
-    /// At rest: added to the vertical effective stress here and below, on the same vertical, kPa. A group's own
-    /// wins over what is carried to it.
+    /// At rest: added to the vertical effective stress here and below, kPa.
     pub surcharge: Option<f64>,
 }
 

@@ -180,7 +180,7 @@ pub enum Route {
     Mfront,
     /// PLAXIS, `User_Mod`.
     Udsm,
-    /// An interface law made from a law of solids, which fills a zone of some `thickness`.
+    /// A law of solids fills a zone of some `thickness`.
     ShearZone,
 }
 

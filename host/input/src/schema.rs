@@ -90,8 +90,8 @@ fn with_bases(complete: Schema, title: &str) -> Value {
     set(&mut variant, "required", json!(["name"]));
     set_property(&mut variant, "name", name);
     let mut file = part_of(complete.clone());
-    let base = "Another file; this one overrides it, tables key by key, named entries by name.";
-    let variants = "Keys that override the file's; the file then stands for as many.";
+    let base = "A file that this one overrides: tables key by key, named entries by name.";
+    let variants = "Keys that override the file's: a case each.";
     set_property(
         &mut file,
         "base",

@@ -31,32 +31,32 @@ pub struct Study {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StudyFile {
-    /// Title of the study.
+    /// Title.
     #[serde(default)]
     pub title: String,
-    /// The case: a case file, or a folder with `case.toml`, relative to this file.
+    /// A case file, or a folder with `case.toml`, relative to this file.
     #[schemars(with = "PathBuf")]
     pub case: Spanned<PathBuf>,
-    /// The variant of the case, if it has variants.
+    /// Variant of the case.
     #[schemars(with = "Option<String>")]
     pub variant: Option<Spanned<String>>,
-    /// How the values of the runs are chosen.
+    /// How values are chosen.
     pub method: Method,
-    /// Number of runs of `latin_hypercube` and `sobol`. For `saltelli` the number of base points: each
-    /// is two runs more than there are parameters.
+    /// Runs of `latin_hypercube` and `sobol`; base points of `saltelli`: k + 2 runs each for k
+    /// parameters.
     #[schemars(with = "Option<usize>", extend("minimum" = 1))]
     pub runs: Option<Spanned<usize>>,
-    /// What random numbers begin with; the same seed gives the same runs. 0 if left out.
+    /// Seed of random numbers; default 0. The same seed gives the same runs.
     #[schemars(with = "Option<u64>")]
     pub seed: Option<Spanned<u64>>,
-    /// Whether each run has a report and the figures of its case; they can be written later, too.
+    /// Each run has a report and figures; they can be written later, too.
     #[serde(default)]
     pub reports: bool,
-    /// What varies.
+    /// Parameters that vary.
     #[serde(rename = "parameter")]
     #[schemars(with = "Vec<ParameterInput>")]
     pub parameters: Vec<Spanned<ParameterInput>>,
-    /// What counts of the results of a run, by name; the last value of every probe if left out.
+    /// Results that count, by name; default: last values of all probes.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, OutputInput>")]
     pub outputs: Named<OutputInput>,
@@ -66,18 +66,16 @@ pub struct StudyFile {
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// Every value of each parameter with every value of the others; the last parameter varies fastest.
+    /// All combinations of values; the last parameter varies fastest.
     Grid,
-    /// The first values of all parameters, then the second ones, and so on.
+    /// First values of all parameters, then second values, and so on.
     List,
-    /// Random points: of as many equally probable parts as there are runs, each parameter has one value in
-    /// each.
+    /// Random points: each parameter has one value in each of n equally probable parts, for n runs.
     LatinHypercube,
-    /// The points of Sobol', which fill the space evenly however many there are, shifted by random digits (a digital
-    /// shift), the same for one `seed`; best are 2, 4, 8, … runs.
+    /// Points of Sobol', evenly spread, with a random digital shift; best are 2, 4, 8, … runs.
     Sobol,
-    /// For the indices of sensitivity: two samples of such points, and the first one with the values of one parameter
-    /// from the second, for each parameter. Best are 2, 4, 8, … base points.
+    /// Sensitivity indices: two samples of such points and, for each parameter, the first sample with
+    /// its values from the second. Best are 2, 4, 8, … base points.
     Saltelli,
 }
 
@@ -103,25 +101,25 @@ impl Method {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ParameterInput {
-    /// What tables and figures call it; the key if left out.
+    /// Name in tables and figures; default: the key.
     #[schemars(with = "Option<String>")]
     pub name: Option<Spanned<String>>,
-    /// Dotted path in the case file, as `--set` takes it; or several, which all have this value.
+    /// Dotted path in the case file, as of `--set`; or several with the same value.
     #[schemars(with = "Keys")]
     pub key: Spanned<Keys>,
     /// These values.
     #[schemars(with = "Option<Vec<schema::AnyValue>>")]
     pub values: Option<Spanned<Vec<Spanned<Value>>>>,
-    /// Numbers between these two, all equally probable.
+    /// Between these two, uniform.
     #[schemars(with = "Option<[f64; 2]>")]
     pub uniform: Option<Spanned<[f64; 2]>>,
-    /// Numbers between these two, their logarithms equally probable.
+    /// Between these two, uniform in the logarithm.
     #[schemars(with = "Option<[f64; 2]>")]
     pub log_uniform: Option<Spanned<[f64; 2]>>,
-    /// Normally distributed numbers between two bounds.
+    /// Normal distribution between two bounds.
     #[schemars(with = "Option<NormalInput>")]
     pub normal: Option<Spanned<NormalInput>>,
-    /// In a `grid`: this many values of the distribution, equally probable parts apart, its ends among them.
+    /// In a `grid`: number of values, equally probable parts apart, with both ends.
     #[schemars(with = "Option<usize>", extend("minimum" = 1))]
     pub levels: Option<Spanned<usize>>,
     /// Whole numbers only.
@@ -146,9 +144,9 @@ pub enum Keys {
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NormalInput {
-    /// Mean, before anything is cut off.
+    /// Mean before the cut.
     pub mean: f64,
-    /// Standard deviation, before anything is cut off.
+    /// Standard deviation before the cut.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub deviation: f64,
     /// Smallest value.
@@ -161,15 +159,15 @@ pub struct NormalInput {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct OutputInput {
-    /// The probe, or another column of `history.csv`.
+    /// Probe, or another column of `history.csv`.
     #[schemars(with = "String")]
     pub probe: Spanned<String>,
-    /// Which of its values; `final` if left out.
+    /// Which value; default `final`.
     #[schemars(with = "Option<Take>")]
     pub take: Option<Spanned<Take>>,
-    /// Instead: its value where another probe first comes to a given value, linear between increments.
+    /// Its value where another probe first reaches a value, linear between increments.
     pub at: Option<AtInput>,
-    /// Only values of this phase.
+    /// Only in this phase.
     #[schemars(with = "Option<String>")]
     pub phase: Option<Spanned<String>>,
 }

@@ -61,10 +61,10 @@ impl Adapter {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Externals {
-    /// Its library is refused, with their names.
+    /// Refuse the library.
     #[default]
     Refuse,
-    /// Traps are in their place: a call ends the worker process and names the routine.
+    /// A call ends the worker process and names the routine.
     Trap,
 }
 
@@ -82,10 +82,10 @@ impl Externals {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Order {
-    /// Column by column, as Fortran keeps matrices.
+    /// By columns, as in Fortran.
     #[default]
     Columns,
-    /// Row by row, as C does.
+    /// By rows, as in C.
     Rows,
 }
 
@@ -103,10 +103,10 @@ impl Order {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Scratch {
-    /// They are removed with the folder.
+    /// Removed with the folder.
     #[default]
     Remove,
-    /// They stay, and the program says where.
+    /// Kept; the program says where.
     Keep,
 }
 

@@ -322,7 +322,7 @@ impl Axis {
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum Analysis {
-    /// x is the radius r, y the axis z; integrals over the whole turn.
+    /// x is r, y is z; integrals over the whole turn.
     Axisymmetric,
     /// Unit thickness.
     PlaneStrain,
@@ -350,11 +350,11 @@ impl Analysis {
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum Formulation {
-    /// 8-node quads with a continuum law in global axes.
+    /// Continuum law in global axes.
     Solid,
-    /// 8-node quads of a thin layer, with an interface law or a continuum law in its own axes.
+    /// Interface law, or continuum law in axes of the layer, in a row or column of elements.
     ThinLayer,
-    /// Three double nodes with an interface law.
+    /// Interface law on three double nodes, inserted along `line`.
     ZeroThickness,
 }
 
@@ -373,18 +373,18 @@ impl Formulation {
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum Integration {
-    /// Quads: 3 × 3 Gauss points; triangles: 3 points, as `projected` (zero thickness: 3 Gauss points).
+    /// 3 × 3 Gauss points (zero thickness: 3); triangles as `projected`.
     Full,
-    /// Quads: 2 × 2 Gauss points; triangles: 3 (zero thickness: 2 Gauss points).
+    /// 2 × 2 Gauss points (zero thickness: 2); triangles 3; not for 9-node quads.
     Reduced,
-    /// Solids: as many points as `reduced` (quads: 3 along curved sides), with strains whose nodal forces are
-    /// integrated exactly.
+    /// Solids: as many points as `reduced` (3 along clearly curved sides of quads); exact integral of
+    /// nodal forces; 9-node quads as `b_bar`.
     Projected,
-    /// Solids: all Gauss points (quads 9, triangles 6), with a volume strain that is linear in each element.
+    /// Solids: all Gauss points (quads 9, triangles 6), volume strain linear in each element.
     BBar,
-    /// Thin layer: 3 points along the layer on its mid-surface, mid-thickness nodes tied.
+    /// Thin layer: 3 points along its mid-surface, mid-thickness nodes tied.
     Mean,
-    /// Zero thickness: the three nodes (Newton–Cotes).
+    /// Zero thickness: its three nodes (Newton–Cotes).
     Nodes,
 }
 
@@ -394,6 +394,6 @@ pub enum Integration {
 pub enum InPlane {
     /// E*, ν* of equations (18), (19).
     Elastic,
-    /// None: stresses along the layer stay unchanged.
+    /// Stresses along the layer stay.
     None,
 }

@@ -9,36 +9,37 @@ use std::fmt::Debug;
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "SolverInput")]
 pub struct Settings {
-    /// Which matrix the iterations use.
+    /// Matrix of the iterations.
     pub method: Method,
-    /// Where the tangents of laws come from.
+    /// Source of the laws' tangents.
     pub tangents: Tangents,
-    /// Largest residual force, relative to the largest of the forces in play (2-norms).
+    /// Largest residual over the largest of the forces in play (2-norms).
     #[serde(deserialize_with = "tolerance")]
     pub force_tolerance: f64,
-    /// Largest correction, relative to the displacement increment (2-norms).
+    /// Largest correction over the displacement increment (2-norms).
     #[serde(deserialize_with = "tolerance")]
     pub displacement_tolerance: f64,
-    /// Residual, relative as `force_tolerance`, that is tolerated where Newton iterations and relaxation come to a
-    /// standstill above the tolerance and displacements have settled to a tenth of the increment. Each is reported and
-    /// counted in the summary. 0 tolerates none.
+    /// Residual, relative as `force_tolerance`, tolerated where iterations and relaxation stand still
+    /// and displacements have settled to a tenth of the increment; reported and counted in the summary.
+    /// 0: none.
     #[serde(deserialize_with = "tolerated")]
     pub tolerated_residual: f64,
-    /// What counts as equilibrium.
+    /// Criterion of equilibrium.
     pub convergence: Convergence,
-    /// Iterations after which an increment is cut back; those of the method if left out.
+    /// Iterations before a cut-back; default: 25 for `auto` and `newton`, 200 for `modified_newton`,
+    /// 1000 for `initial_stress`, 100 for `quasi_newton`.
     #[serde(deserialize_with = "iterations")]
     pub max_iterations: Option<usize>,
-    /// Maximum number of halvings of an increment; at least six under viscous control.
+    /// Most halvings of an increment; at least 6 under viscous control.
     #[serde(deserialize_with = "halvings")]
     pub max_halvings: u32,
-    /// Whether to search along a correction that makes the residual grow.
+    /// Search along corrections that make the residual grow.
     pub line_search: bool,
-    /// Whether to relax viscously where Newton iterations come to a standstill.
+    /// Relax viscously where Newton iterations stand still.
     pub relaxation: bool,
-    /// What leads from one equilibrium to the next where the load alone cannot.
+    /// Control of the path from one equilibrium to the next.
     pub control: Control,
-    /// What becomes of linear groups.
+    /// Treatment of linear groups.
     pub equations: Equations,
 }
 
@@ -121,18 +122,16 @@ impl Default for Settings {
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// Consistent tangents; those of an earlier iteration, or of the step before, as long as each
-    /// correction takes nearly all of the residual away.
+    /// Consistent tangents, kept while each correction removes nearly all of the residual.
     #[default]
     Auto,
     /// Consistent tangents at every iteration.
     Newton,
-    /// Consistent tangents at the first iteration of every step.
+    /// Consistent tangents of the first iteration of each step.
     ModifiedNewton,
-    /// The elastic stiffness, factorised once a phase.
+    /// Elastic stiffness, factorised once a phase.
     InitialStress,
-    /// Consistent tangents of an earlier iteration, renewed where there is no progress; the
-    /// corrections are accelerated by what the last ones achieved.
+    /// Consistent tangents of an earlier iteration, renewed without progress, with acceleration.
     QuasiNewton,
 }
 
@@ -168,13 +167,13 @@ impl Method {
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Tangents {
-    /// From the law; differences of its stresses where it says that its tangents are approximate, or
-    /// where they are found not to be the derivatives of its stresses. With `auto` and `newton`.
+    /// The law's; with the methods `auto` and `newton` differences of its stresses if they are
+    /// declared or found inexact.
     #[default]
     Auto,
-    /// From the law, whatever they are worth.
+    /// The law's, always.
     Law,
-    /// Differences of the stresses of all laws that are not linear.
+    /// Differences of the stresses of all nonlinear laws.
     Differences,
 }
 
@@ -182,12 +181,11 @@ pub enum Tangents {
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Convergence {
-    /// Those of the residual and of the last correction.
+    /// Residual and last correction.
     #[default]
     Both,
-    /// That of the residual alone, for curves whose displacements drift while the load is known: with a
-    /// `force_tolerance` of 1e-2 to 1e-4 the tolerated error of geotechnical programs. The end of
-    /// the phase reports the open corrections; reactions and loads still have to balance.
+    /// Residual alone, for displacements that drift at a known load; with a `force_tolerance` of 1e-2 to
+    /// 1e-4 the tolerance of geotechnical programs. The end of the phase reports the corrections.
     Force,
 }
 
@@ -195,17 +193,15 @@ pub enum Convergence {
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Control {
-    /// The load factor, increment by increment; where five steps in a row find no equilibrium, short
-    /// steps under viscous control to the end of the increment, unless `relaxation` is off.
+    /// Load factor; after five steps without equilibrium `viscous` to the end of the increment, unless
+    /// `relaxation` is off.
     #[default]
     Auto,
-    /// The load factor alone: a phase ends where it leads no further.
+    /// Load factor; the phase ends where that fails.
     Load,
-    /// The load factor; where it leads no further, the arc length of the path of equilibrium, on
-    /// which the load may fall and rise again.
+    /// Load factor; where that fails, the arc length of the path, on which the load may fall.
     ArcLength,
-    /// The load factor; where Newton iterations stand still, the path of a viscous body on its way to its next
-    /// equilibrium, committed step by step.
+    /// Load factor; where that fails, the path of a viscous body to its next equilibrium, step by step.
     Viscous,
 }
 
@@ -220,12 +216,12 @@ impl Control {
 #[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Equations {
-    /// Condensed where that is expected to be faster.
+    /// Condensed where probably faster.
     #[default]
     Auto,
-    /// Linear groups are factorised once a phase and condensed onto what they share with the others.
+    /// Factorised once a phase and condensed onto the nodes shared with others.
     Condensed,
-    /// All groups are assembled and factorised at every iteration.
+    /// All groups assembled and factorised at every iteration.
     Sparse,
 }
 

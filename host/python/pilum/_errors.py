@@ -18,7 +18,7 @@ __all__ = [
 
 
 class PilumWarning(UserWarning):
-    """Something that the user should know: a value outside its usual range, say."""
+    """A warning, for example of a value outside its usual range."""
 
 
 def warn(message: str) -> None:
@@ -32,8 +32,8 @@ def warn(message: str) -> None:
 class Error(Exception):
     """Anything that Pilum cannot do. Attributes that do not apply are None.
 
-    It is also of Python's class for that error: ValueError for a wrong value or shape, TypeError for a wrong type,
-    KeyError for an unknown name, MemoryError for lack of memory.
+    It is also a ValueError for a wrong value or shape, TypeError for a wrong type, KeyError for an unknown
+    name, MemoryError for lack of memory.
     """
 
     message: str
@@ -41,7 +41,7 @@ class Error(Exception):
     hint: str | None = None
     """What could be done about it."""
     place: str | None = None
-    """Where in the course of a run or of a driver, in words."""
+    """Place in a run or a driver, in words."""
     phase: str | None = None
     """Name of the phase."""
     segment: int | None = None
@@ -49,7 +49,7 @@ class Error(Exception):
     increment: int | None = None
     """Number of the increment in its phase or segment, from 1."""
     reached: float | None = None
-    """How far it came: in increments of the phase; of a driver in a fraction of the increment."""
+    """Increments of the phase reached; of a driver a fraction of the increment."""
     law: str | None = None
     """Id of the law."""
     group: str | None = None
@@ -57,23 +57,23 @@ class Error(Exception):
     element: int | None = None
     """Number of the element in its group, from 1."""
     point: int | None = None
-    """Number of the integration point in its element, from 1; of a batch of `Law.integrate` its row, from 0."""
+    """Number of the integration point in its element, from 1; in `Law.integrate` its row, from 0."""
     position: Sequence[float] | None = None
     """Coordinates of the point, m."""
     outcome: str | None = None
     """What the law answered: "cut_step", "domain", "numeric", "internal" and so on."""
     factor: float | None = None
-    """With "cut_step": by how much a smaller increment should be shorter."""
+    """With "cut_step": factor on the increment."""
     cause: str | None = None
-    """Why, in the words of the law, or of the iterations."""
+    """Reason from the law, or from the iterations."""
     file: str | None = None
-    """The file that is wrong; None where it was a dictionary, or `set`."""
+    """The wrong file; None for a dictionary or `set`."""
     line: int | None = None
     """The line of it, from 1."""
     column: int | None = None
     """The column of it, from 1."""
     key: str | None = None
-    """In a dictionary, or in `set`: the wrong key, written as in `set`; entries of lists by their `name`, or from 1."""
+    """The wrong key of a dictionary or of `set`, as in `set`; entries of lists by their `name`, or from 1."""
     text: str | None = None
     """The text at that place."""
 
@@ -107,7 +107,7 @@ def _again(kind: type[Error], message: str, attributes: dict[str, Any]) -> Error
 
 
 class InputError(Error, ValueError):
-    """A file, a dictionary or what was asked for is wrong: whoever wrote it has to act."""
+    """A file, a dictionary or an argument is wrong."""
 
 
 class WrongTypeError(InputError, TypeError):
@@ -135,7 +135,7 @@ class NoEquilibriumError(Error):
 
 
 class LawError(Error):
-    """A law fails, or its library cannot be used: its author has to act, or the increment was too large."""
+    """A law fails, for example over too large an increment, or its library cannot be used."""
 
 
 class InternalError(Error):

@@ -19,9 +19,9 @@ __all__ = ["Field", "Fields"]
 class Field(Mapping[str, NDArray[np.float64]]):
     """Fields at one time: arrays by name.
 
-    `displacement` has a row a node, (n, 2), m. All others have a value a cell, the mean over its integration
-    points: `stress_11` … (kPa, tension positive), `jump_n`, `traction_t` …, internal variables by their ids,
-    `group` and `active`.
+    `displacement` has a row a node, (n, 2), m. All others have a value a cell, the mean over its
+    integration points: `stress_11` … (kPa), `jump_n`, `traction_t` …, internal variables by id, `group` and
+    `active`.
     """
 
     def __init__(self, path: Path, time: float) -> None:
@@ -48,12 +48,12 @@ class Field(Mapping[str, NDArray[np.float64]]):
 
     @property
     def cells(self) -> list[NDArray[np.int64]]:
-        """Nodes of every cell: 8 of a quad, 6 of a triangle (corners, then mid-sides), 3 of an interface."""
+        """Nodes of cells: 8 or 9 of a quad, 6 of a triangle (corners, then mid-sides), 3 of an interface."""
         return np.split(self._connectivity, self._ends[:-1]) if len(self._ends) else []
 
     @property
     def table(self) -> Table:
-        """Values of cells, as columns of a table, with the coordinates of their middles."""
+        """Values of cells, with the coordinates of their middles."""
         starts = np.concatenate([[0], self._ends[:-1]])
         n = self._ends - starts
         middle = np.add.reduceat(self.nodes[self._connectivity], starts) / n[:, None]
@@ -75,7 +75,7 @@ class Field(Mapping[str, NDArray[np.float64]]):
         return len(self._values)
 
     def to_pyvista(self) -> Any:
-        """The grid of PyVista, which has to be installed."""
+        """A grid of PyVista, which has to be installed."""
         import pyvista
 
         return pyvista.read(self.path)
@@ -85,7 +85,7 @@ class Field(Mapping[str, NDArray[np.float64]]):
 
 
 class Fields(Sequence[Field]):
-    """Fields by time. `fields[-1]` are the last; a name gives the array at the last time: `fields["stress_22"]`."""
+    """Fields by time. `fields[-1]` are the last, `fields["stress_22"]` an array at the last time."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

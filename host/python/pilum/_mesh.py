@@ -36,12 +36,11 @@ _MESHIO = {
 class Mesh:
     """A mesh in the plane: nodes, groups of cells, named lines and points.
 
-    `nodes` has coordinates, shape (n, 2), m. `groups` gives by name the nodes of cells, counted from 0: shape
-    (m, 8) of quads or (m, 6) of triangles, corners in a round, then the mid-sides that follow them; or a list of
-    both. `lines` gives by name edges, shape (m, 3): two ends and the middle; or points, shape (m, 1). Cells and
-    edges of first order, (m, 4), (m, 3) and (m, 2), get nodes in the middle of straight sides, behind all others;
-    of quads of 9 nodes the last one is left out. Interfaces without thickness are no part of it: they are inserted
-    along lines.
+    `nodes` has coordinates, shape (n, 2), m. `groups` gives by name the nodes of cells, from 0: shape (m,
+    8) of quads or (m, 6) of triangles, corners in order, then the mid-sides that follow them; or a list of
+    both. `lines` gives by name edges, shape (m, 3): two ends and the middle; or points, shape (m, 1). Cells
+    and edges of first order, (m, 4), (m, 3) and (m, 2), get mid-side nodes, after all others. Quads of 9
+    nodes, (m, 9), have the one in the middle last. Interfaces without thickness are inserted along lines, not meshed.
     """
 
     def __init__(
@@ -88,7 +87,7 @@ class Mesh:
     ) -> Mesh:
         """8-node quads between the lines of a grid at `x` and `y`, which rise, m.
 
-        `group` is the name of all cells, or gives it by the coordinates of a cell's middle.
+        `group` is the name of all cells, or a function of the coordinates of a cell's middle.
         """
         across, up = _numbers("x", x), _numbers("y", y)
         for values in (across, up):
@@ -149,9 +148,9 @@ class Mesh:
         return cls(mesh.points, groups, lines)
 
     def name_line(self, name: str, where: Callable[[Any, Any], Any]) -> None:
-        """Names a line after the edges whose ends and middle fulfil a condition on their coordinates.
+        """Names the line of the edges whose ends and middle fulfil a condition.
 
-        `mesh.name_line("top", lambda x, y: y == 1.0)`; `where` takes arrays, and gives as many of true and false.
+        `mesh.name_line("top", lambda x, y: y == 1.0)`: `where` takes arrays and gives one of booleans.
         """
         if not callable(where):
             raise InputError(f"line `{name}`: expected a condition, a function of x and y")

@@ -17,8 +17,8 @@ __all__ = ["Results"]
 
 
 class Results:
-    """Results of a run in a folder. Tables are read when they are asked for, and refused with InputError
-    where another run has written there since: give each run its own folder with `results`.
+    """Results of a run in a folder. Tables are read on demand; InputError if another run has written there
+    since: give each run its own folder with `results`.
     """
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
@@ -30,23 +30,23 @@ class Results:
 
     @cached_property
     def history(self) -> Table:
-        """A row for every increment: `phase`, `increment`, `time`, the probes by their names, `iterations`."""
+        """A row for every increment: `phase`, `increment`, `time`, probes, `iterations`."""
         self._check()
         return Table.read(self.folder / "history.csv")
 
     @cached_property
     def profile(self) -> Table:
-        """Integration points of interfaces and thin layers, as often as `output.profile` says."""
+        """Integration points of interfaces and thin layers."""
         return self._table("profile.csv", '"output.profile": "phases"')
 
     @cached_property
     def points(self) -> Table:
-        """Integration points of all other groups, as often as `output.points` says."""
+        """Integration points of all other groups."""
         return self._table("points.csv", '"output.points": "phases"')
 
     @cached_property
     def pile(self) -> Table:
-        """A row for every station of the pile and increment, where the case has a `[pile]`."""
+        """A row for every station of a `[pile]` and increment."""
         return self._table("pile.csv", None)
 
     @cached_property
@@ -56,13 +56,13 @@ class Results:
 
     @cached_property
     def fields(self) -> Fields:
-        """Fields over the mesh, as often as `output.fields` says."""
+        """Fields over the mesh."""
         self._check()
         return Fields(self.folder / "fields.pvd")
 
     @cached_property
     def summary(self) -> dict[str, Any]:
-        """What was run with what, and how it ended: `status`, `warnings`, `laws` and more."""
+        """`summary.json`: `status`, `warnings`, `laws` and more."""
         self._check()
         with open(self.folder / "summary.json", encoding="utf-8") as file:
             summary: dict[str, Any] = json.load(file)

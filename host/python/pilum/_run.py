@@ -30,7 +30,7 @@ class Progress(NamedTuple):
     iterations: int
     """Iterations of the increment, failed attempts included."""
     cut_backs: int
-    """Steps of the phase so far that were repeated with a smaller size."""
+    """Cut-backs in the phase so far."""
 
 
 class Step(TypedDict):
@@ -51,13 +51,12 @@ class Step(TypedDict):
 
 
 class Problem:
-    """A problem to compute: a case, as a file or as a dictionary with the same keys, perhaps on a mesh of arrays.
+    """A problem to compute: a case, as a file or a dictionary, perhaps on a mesh of arrays.
 
-    `case` is a case file, a folder with `case.toml`, or a dictionary with the keys of a case file. Its `laws` may be
-    `pilum.Law`s; their `law_path` is searched, too, and if one of them is isolated, all are. `mesh` is a `pilum.Mesh`
-    or a mesh of meshio; then the dictionary needs no key `mesh`. `set` overrides settings of the case,
-    `{"phase.push.increments": 80}`; `variant` names one of several. `isolate` calls laws in separate processes; it is
-    the number of seconds that a call may take. Paths in a dictionary are relative to the working folder.
+    `case` is a file, a folder with `case.toml`, or a dictionary; `set` and `isolate` are those of
+    `pilum.run`. In a dictionary `laws` may be `pilum.Law`s; their `law_path` is searched, too, and if one
+    of them is isolated, all are. `mesh` is a `pilum.Mesh` or a mesh of meshio, instead of the key `mesh`.
+    `variant` names one of several. Paths in a dictionary are relative to the working folder.
     """
 
     def __init__(
@@ -71,7 +70,7 @@ class Problem:
         isolate: float | None = None,
     ) -> None:
         self.name = name
-        """Name of the problem, and of its folder of results if it does not come from a file."""
+        """Its name, and that of its folder of results without a file."""
         self._mesh: bytes | None = None
         if mesh is not None:
             if not isinstance(case, Mapping):
@@ -99,7 +98,7 @@ class Problem:
         self._isolate = isolate
 
     def start(self) -> _pilum.Simulation:
-        """A simulation before its first phase, checked. Each one goes its own way."""
+        """A checked simulation before its first phase; each one is independent."""
         return _pilum.Simulation(
             self._case,
             name=self.name,
@@ -117,7 +116,7 @@ class Problem:
         resume: bool = False,
         checkpoints: float | None = 1.0,
     ) -> Results | Any:
-        """Runs it as the command does, with results in a folder: see `pilum.run`."""
+        """As `pilum.run`."""
         done = _pilum.run(
             self._case,
             self.name,
@@ -174,21 +173,20 @@ def run(
     checkpoints: float | None = 1.0,
     isolate: float | None = None,
 ) -> Results | Any:
-    """Runs a case and returns its `Results`; of a case with variants a dictionary of them by their names.
+    """Runs a case and returns its `Results`, with variants a dictionary of them by name.
 
-    `case` is a file, a folder with `case.toml`, a dictionary with the keys of a case file, or a `Problem`. `set`
-    overrides its settings: `{"phase.push.increments": 80, "laws.mepi.parameters.k_n": 2e5}`. `watch` is called
-    with a `Progress` after every increment, by the thread that called; what it raises stops the run and is raised
-    here. Ctrl-C stops the run; everything up to then is in its folder, and `resume=True` goes on from there.
+    `case` is a file, a folder with `case.toml`, a dictionary with the keys of a case file, or a `Problem`.
+    `set` overrides settings: `{"phase.push.increments": 80, "laws.mepi.parameters.k_n": 2e5}`. `watch` is
+    called with a `Progress` after every increment, by the calling thread; its exceptions stop the run and
+    are raised here. Ctrl-C stops the run; `resume=True` goes on from there.
 
-    Results go into `results`, or where the command puts them: `results/<case>`. `checkpoints` is the time
-    between checkpoints in seconds. `isolate` calls laws in separate processes, and is the number of seconds that a
-    call may take: a law that crashes raises LawError.
+    Results go into the folder `results`, default `results/<case>`. `checkpoints` is the time between
+    checkpoints, s. `isolate` calls laws in separate processes and is the time limit of a call, s: a law
+    that crashes raises LawError.
 
-    A type checker sees `Results`, since it does not read the case: with variants,
-    `runs = typing.cast("dict[str, pilum.Results]", pilum.run(case))`.
+    With variants a type checker needs `typing.cast("dict[str, pilum.Results]", pilum.run(case))`.
 
-    Raises InputError, NoEquilibriumError or LawError, with their places as attributes. Warnings are PilumWarning.
+    Raises InputError, NoEquilibriumError or LawError. Warnings are PilumWarning.
     """
     if isinstance(case, Problem):
         if set is not None or variant is not None or isolate is not None:
@@ -222,12 +220,11 @@ def point(
     variant: str | None = None,
     isolate: float | None = None,
 ) -> Table | Any:
-    """Leads a law along a path at one point and returns the `Table` of its increments.
+    """Leads a law along a path and returns the `Table` of its increments.
 
-    `driver` is a driver file, or a dictionary with the keys of one; of a driver with variants a dictionary of
-    tables by their names is returned. Columns are `increment`, jumps and tractions (or strains and stresses) by
-    component, internal variables by their ids, `iterations`; row 0 is the initial state. Units are m and kPa;
-    tension and opening are positive.
+    `driver` is a driver file, or a dictionary with its keys; with variants the result is a dictionary of
+    tables by name. Columns are `increment`, jumps and tractions (or strains and stresses) by component,
+    internal variables by id, `iterations`; row 0 is the initial state.
     """
     source = dict(driver) if isinstance(driver, Mapping) else os.fspath(driver)
     led = _pilum.point(source, None if set is None else dict(set), variant, isolate)

@@ -25,9 +25,9 @@ _SHOWN = 10
 class Table(dict[str, NDArray[Any]]):
     """Columns of arrays by name, all of one length; what is missing is NaN.
 
-    A dictionary of names and one-dimensional arrays: float64, int64 of numbers that count, texts of names (a phase may be called `None` or `1`). Its length
-    is the number of rows. pandas and polars take it as it is: `pandas.DataFrame(table)`, `polars.DataFrame(table)`; by the Arrow C stream
-    interface so do pyarrow, DuckDB and others.
+    A dictionary of one-dimensional arrays: float64, int64 of counts, texts. Its length is the number of
+    rows. pandas, polars, pyarrow and DuckDB take it (by the Arrow C stream interface):
+    `pandas.DataFrame(table)`.
     """
 
     def __init__(self, columns: Mapping[str, Any]) -> None:
@@ -72,7 +72,7 @@ class Table(dict[str, NDArray[Any]]):
         return 0
 
     def where(self, **equal: Any) -> Table:
-        """The rows in which columns have these values: `profile.where(phase="push", increment=10)`."""
+        """Rows with these values: `profile.where(phase="push", increment=10)`."""
         chosen = np.ones(len(self), dtype=bool)
         for name, value in equal.items():
             chosen &= self[name] == value

@@ -18,7 +18,7 @@ def program() -> Path:
 
 
 def include() -> Path:
-    """The folder of the headers for laws in C and C++; `pilum_law.f90` for Fortran is in `share` next to it."""
+    """Folder of the headers for laws in C and C++; `pilum_law.f90` for Fortran is in `share` next to it."""
     return _INSTALLED / "include" / "pilum"
 
 

@@ -39,12 +39,10 @@ pub(crate) fn warn(py: Python<'_>, message: &str) -> PyResult<()> {
     warn.call1((message,)).map(|_| ())
 }
 
-/// A constitutive law with its parameters fixed, for any number of points.
+/// A law with its parameters, for any number of points.
 ///
-/// Parameters are given by name, in the units of `pilum.describe(id)`: kPa, m, degrees. Omitted parameters take
-/// their default. Other keys are those of a law in a case file: `adapter` ("umat", "mfront", "udsm",
-/// "shear_zone"), `library`, `sidecar`, `thickness`, `initial` and so on. A parameter of such a name goes into
-/// `parameters`.
+/// Parameters are given by name; omitted ones take their default. Other keys are those of a law in a case
+/// file, such as `adapter`, `library`, `initial`; a parameter of such a name goes into `parameters`.
 #[pyclass(frozen, module = "pilum")]
 pub(crate) struct Law {
     built: Arc<BuiltLaw>,
@@ -55,7 +53,7 @@ pub(crate) struct Law {
     is_apart: bool,
     /// It was made for a hypothesis that was named.
     is_chosen: bool,
-    /// Folders that it was looked for in before all others.
+    /// Folders searched first.
     folders: Vec<PathBuf>,
     /// Seconds that a call may take in a separate process.
     isolate: Option<f64>,
@@ -209,25 +207,23 @@ impl Law {
         })
     }
 
-    /// Folders that it was looked for in before all others.
+    /// Folders searched first.
     #[getter]
     fn law_path(&self) -> Vec<PathBuf> {
         self.folders.clone()
     }
 
-    /// Seconds that a call may take in a separate process; None if it is called in this one.
+    /// Seconds that a call may take in a separate process; None in this process.
     #[getter]
     fn isolate(&self) -> Option<f64> {
         self.isolate
     }
 
-    /// Points that carry these fluxes before anything has happened, with the internal variables that the law gives
-    /// them.
+    /// Points that carry these fluxes.
     ///
-    /// `points` is their number. `flux` gives their tractions or stresses (kPa, tension positive; zero if left
-    /// out), shape (n, components) or (components,) for all; `gradient` gives jumps or strains that they have
-    /// already, likewise. `internal`, shape (n, variables) in the order of `variables`, replaces the law's own
-    /// initial values. With the `time` and the `increment` of a saved state too, the points go on from it.
+    /// `points` is their number. `flux` has tractions or stresses (kPa; default 0), shape (n, components)
+    /// or (components,) for all; `gradient` likewise jumps or strains. `internal`, shape (n, variables),
+    /// replaces the law's initial values. `time` and `increment` are those of a saved state.
     #[pyo3(signature = (points=None, *, flux=None, gradient=None, internal=None, time=0.0, increment=0))]
     #[expect(clippy::too_many_arguments, reason = "named in Python")]
     fn initial(
@@ -299,19 +295,17 @@ impl Law {
 
     /// Carries points over an increment: `(flux, tangents, state)`.
     ///
-    /// `gradient` has the jumps (m) or strains (shear strains γ = 2ε) at its end, as totals, shape (n, components);
-    /// `state` is what they start from (points without a history if left out). Returns tractions or stresses
-    /// (kPa, tension positive), shape (n, components); tangents ∂flux/∂gradient, shape (n, components,
-    /// components), None if `tangent` is None; and the state at the end. `dt` is how long the increment takes.
+    /// `gradient` has the jumps (m) or strains at its end, as totals, shape (n, components); `state` is the
+    /// start (default: points without a history), `dt` the duration. Returns tractions or stresses (kPa),
+    /// shape (n, components); tangents ∂flux/∂gradient, shape (n, components, components), None if
+    /// `tangent` is None; and the state at the end.
     ///
-    /// The law reads and writes the arrays themselves, without the interpreter's lock. `out` is a state that is
-    /// not needed any more: its memory, and that of what was returned with it, is used again, and it is no state from
-    /// then on.
-    /// With `copy=False` the state keeps the array of gradients itself, which nobody may write in any more.
-    /// `positions`, shape (n, 2), is where the points lie, for routines that ask.
+    /// The law works on the arrays without the interpreter's lock. The call reuses the memory of `out`, a
+    /// state not needed any more, and of the results returned with it. With `copy=False` the state keeps
+    /// the array of gradients, which nobody may change then. `positions`, shape (n, 2), is for routines
+    /// that need coordinates.
     ///
-    /// Raises LawError, with `point` (from 0) and `outcome`, if a point cannot be carried; `outcome` is
-    /// "cut_step" where a smaller increment may help.
+    /// Raises LawError with `point` (from 0) and `outcome`; "cut_step": a smaller increment may help.
     #[pyo3(
         signature = (gradient, state=None, *, dt=1.0, tangent=Some("consistent"), out=None, copy=true, positions=None),
         text_signature = "($self, gradient, state=None, *, dt=1.0, tangent='consistent', out=None, copy=True, positions=None)"
@@ -434,26 +428,25 @@ impl Law {
         &self.law().description().id
     }
 
-    /// Name of the hypothesis that it is built for.
+    /// Name of its hypothesis.
     #[getter]
     fn hypothesis(&self) -> &'static str {
         self.law().hypothesis().name()
     }
 
-    /// Components of jumps and tractions, or strains and stresses, in the order of the arrays' columns.
+    /// Components, in the order of the arrays' columns.
     #[getter]
     fn components(&self) -> Vec<&'static str> {
         self.law().hypothesis().components().to_vec()
     }
 
-    /// Ids of the internal variables, in the order of the columns of `State.internal`.
+    /// Ids of the internal variables, in the order of `State.internal`.
     #[getter]
     fn variables(&self) -> Vec<String> {
         self.variables.clone()
     }
 
-    /// Values of all parameters with those that were left out, as a law can be made of them again: numbers, of choices
-    /// their names.
+    /// Values of all parameters, defaults included: numbers, of choices their names.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
@@ -474,7 +467,7 @@ impl Law {
         self.law().library().path().to_owned()
     }
 
-    /// SHA-256 of its library, in hexadecimal digits.
+    /// SHA-256 of its library, hexadecimal.
     #[getter]
     fn sha256(&self) -> &str {
         self.law().library().sha256()

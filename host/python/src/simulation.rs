@@ -16,10 +16,10 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
 
-/// A problem on its way through its phases, in memory: nothing is written.
+/// A problem on its way through its phases, in memory.
 ///
-/// `source` is a case file, a folder with `case.toml`, or a dictionary with the keys of a case file; where it has
-/// variants, `variant` names one. `pilum.Problem.start` makes one too.
+/// `source` is a case file, a folder with `case.toml`, or a dictionary; `variant` names one of several.
+/// `pilum.Problem.start` makes one, too.
 #[pyclass(frozen, module = "pilum")]
 pub(crate) struct Simulation {
     inner: Mutex<Inner>,
@@ -38,8 +38,8 @@ struct Inner {
     written: Option<String>,
 }
 
-/// A state of a simulation, for `Simulation.go_to`: after a whole increment, or, where one could not be finished, the last
-/// one in equilibrium on its way.
+/// A state for `Simulation.go_to`: after a whole increment, or the last one in equilibrium of an unfinished
+/// one.
 #[pyclass(frozen, module = "pilum")]
 pub(crate) struct SimulationState {
     state: State<'static>,
@@ -47,10 +47,10 @@ pub(crate) struct SimulationState {
     /// Number of the phase, from 0.
     #[pyo3(get)]
     phase: usize,
-    /// Whole increments of it that are done.
+    /// Whole increments done.
     #[pyo3(get)]
     increment: usize,
-    /// How far the phase came, in increments: more than `increment` by the part of one that could not be finished.
+    /// Increments of the phase with the part of an unfinished one.
     #[pyo3(get)]
     reached: f64,
 }
@@ -222,12 +222,10 @@ impl Simulation {
         })
     }
 
-    /// Goes on by one increment, into the next phase where one is over.
+    /// Goes on by one increment.
     ///
-    /// Returns a dictionary with `phase`, `increment` (from 1), `of`, `time`, `iterations` and `unreliable` (why a
-    /// law calls a result inaccurate, or None); None after the last. After an exception the state is the last one
-    /// in equilibrium, which may lie within the increment: `state().reached` says where. `go_to` leads back to another;
-    /// to that of the last whole increment if it was taken before.
+    /// Returns a `Step`; None after the last. After an exception the state is the last one in equilibrium,
+    /// perhaps within the increment (`state().reached`). `go_to` leads back to one taken before.
     fn step<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let done = self.advance(py)?;
         done.map(|increment| told(py, &increment)).transpose()
@@ -278,8 +276,8 @@ impl Simulation {
         Ok(of_rows(py, nodes, 2)?.into_any())
     }
 
-    /// For every row of `nodes` the row in the `nodes` of the mesh, of a file the place of the node there, from 0; -1 of
-    /// those that interfaces and divisions have made. Nodes that no element of the case has are left out of all results.
+    /// For every row of `nodes` its row in the mesh or its place in the file, from 0; -1 for nodes made by
+    /// interfaces and divisions. Results have no nodes without an element.
     #[getter]
     fn mesh_rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<i64>>> {
         let inner = self.inner()?;
@@ -298,8 +296,7 @@ impl Simulation {
         Ok(of_rows(py, inner.simulation.snapshot().displacement, 2)?.into_any())
     }
 
-    /// Internal less external forces at the nodes, shape (n, 2): reactions where displacements are prescribed. kN of
-    /// the whole turn, or kN/m.
+    /// Internal less external forces at the nodes, shape (n, 2): kN of the whole turn, or kN/m.
     #[getter]
     fn reactions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let inner = self.inner()?;
@@ -322,9 +319,9 @@ impl Simulation {
 
     /// Integration points of a group: a dictionary of arrays with a row a point.
     ///
-    /// `element` and `point` count from 1, as in the tables; `position` (n, 2), m. Solids and layers have
-    /// `stress` (11 22 33 12, kPa, tension positive, global axes) and `strain`; interfaces and layers `jump`
-    /// (normal, tangential, m) and `traction` (kPa); and all the internal variables of their law, by their ids.
+    /// `element` and `point` count from 1; `position` (n, 2), m. Solids and layers have `stress` (11 22 33
+    /// 12, kPa, global axes) and `strain`; interfaces and layers `jump` (normal, tangential, m) and
+    /// `traction` (kPa); all have the internal variables of their law, by id.
     fn group<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyDict>> {
         let inner = self.inner()?;
         let group = inner.group(name)?;
@@ -381,8 +378,8 @@ impl Simulation {
         Ok(all)
     }
 
-    /// The present state, to go back to; None before the end of the first increment. It is that after the last whole
-    /// increment, but after an exception the last one in equilibrium.
+    /// The present state, to go back to; None before the end of the first increment. After an exception it
+    /// is the last one in equilibrium.
     fn state(&self) -> PyResult<Option<SimulationState>> {
         let mut inner = self.inner()?;
         let Some(state) = inner.simulation.state() else {
@@ -402,9 +399,8 @@ impl Simulation {
         }))
     }
 
-    /// Goes back, or on, to a state of a simulation of the same problem. It may differ in later phases, and in how
-    /// equilibrium is sought; a state on another mesh, of other parameters or of other phases up to its own is refused
-    /// with InputError.
+    /// Goes to a state of a simulation of the same problem. Later phases and solver settings may differ;
+    /// another mesh, other parameters or other phases up to the state raise InputError.
     fn go_to(&self, py: Python<'_>, state: &SimulationState) -> PyResult<()> {
         let own = self.inner()?.likeness();
         if let Some(unlike) = own.unlike(&state.likeness, state.phase) {

@@ -7,9 +7,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-/// Points of a law: the gradients and fluxes that they have reached, their internal variables, and the time.
+/// Points of a law: gradients, fluxes, internal variables, and the time.
 ///
-/// `Law.initial` makes one, `Law.integrate` the one after an increment. Its arrays are not to be written in.
+/// `Law.initial` and `Law.integrate` make it. Do not write into its arrays.
 #[pyclass(frozen, module = "pilum")]
 pub(crate) struct State {
     /// Jumps or strains, a row a point.
@@ -45,14 +45,14 @@ pub(crate) enum Memory {
 
 #[pymethods]
 impl State {
-    /// Jumps (m) or strains (shear strains γ = 2ε) that the points have reached, shape (n, components).
+    /// Jumps (m) or strains, shape (n, components).
     #[getter]
     fn gradient<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.refuse_given()?;
         looked_at(self.gradient.bind(py).as_any())
     }
 
-    /// Tractions or stresses (kPa, tension positive), shape (n, components).
+    /// Tractions or stresses (kPa), shape (n, components).
     #[getter]
     fn flux<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.refuse_given()?;
@@ -66,13 +66,13 @@ impl State {
         looked_at(self.internal.bind(py).as_any())
     }
 
-    /// The time that they have reached.
+    /// Their time.
     #[getter]
     fn time(&self) -> f64 {
         self.time
     }
 
-    /// Increments that have led here.
+    /// Number of increments so far.
     #[getter]
     fn increment(&self) -> u32 {
         self.increment

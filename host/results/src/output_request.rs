@@ -95,13 +95,12 @@ pub struct Cut {
 #[derive(Clone, Copy, Debug, Deserialize, JsonSchema, PartialEq, Eq)]
 #[serde(rename_all = "snake_case")]
 pub enum Reduce {
-    /// Arithmetic mean.
+    /// Arithmetic mean: regions of small elements have more points.
     Mean,
-    /// Mean weighted by what each integration point stands for: area, in axisymmetry of the whole
-    /// turn; of interfaces their own area.
+    /// Mean weighted by the area of each point, in axisymmetry times 2πr; for a layer or interface by
+    /// its own area.
     Average,
-    /// The sum of values times what they stand for: over the area, in axisymmetry over the volume
-    /// of the whole turn; of interfaces over their own area.
+    /// Sum of values times these areas; stresses and strains of a thin layer over its volume.
     Integral,
     /// Smallest.
     Min,
@@ -116,14 +115,13 @@ pub enum Reduce {
 #[serde(deny_unknown_fields, default)]
 #[schemars(rename = "OutputInput")]
 pub struct Output {
-    /// When the profile along interfaces is written.
+    /// Profile along interfaces and thin layers.
     pub profile: When,
-    /// When all integration points are written.
+    /// All integration points.
     pub points: When,
-    /// When fields for a viewer are written.
+    /// Fields for a viewer.
     pub fields: When,
-    /// Whether the error that the mesh makes in the strains is estimated, at the end of every phase and with
-    /// the fields.
+    /// Estimate the error of the mesh in the strains after every phase, and in the fields.
     pub mesh_error: bool,
 }
 
@@ -134,7 +132,7 @@ pub enum When {
     /// Never.
     #[default]
     Never,
-    /// After the last increment of each phase.
+    /// After each phase.
     Phases,
     /// After every increment.
     Increments,

@@ -53,14 +53,14 @@ use text::write::replace;
     reason = "switches of the command line"
 )]
 pub struct Arguments {
-    /// A library: of the contract, of a UMAT with a sidecar next to it, or, with `--driver`, of a UDSM or MFront
-    /// behaviours; or the id of a law, found as by `pilum laws`.
+    /// A library of the contract, a UMAT with its sidecar, with `--driver` a UDSM or MFront
+    /// behaviours, or the id of a law as of `pilum laws`.
     #[arg(required_unless_present = "list")]
     library: Option<String>,
     /// Write JSON.
     #[arg(long)]
     json: bool,
-    /// Run only this check, without those it builds on; may be repeated.
+    /// Run only this check, without those it depends on; may be repeated.
     #[arg(long, value_name = "ID")]
     only: Vec<String>,
     /// Seed of all random numbers.
@@ -69,18 +69,17 @@ pub struct Arguments {
     /// Fix a parameter of the laws, where random ones are refused; may be repeated.
     #[arg(long, value_name = "ID=VALUE", value_parser = setting)]
     set: Vec<(String, f64)>,
-    /// Lead the law along the path of this driver file, with its parameters, and the sidecar it names, in
-    /// place of random ones.
+    /// Use the path, parameters and sidecar of this driver file instead of random ones.
     #[arg(long, value_name = "FILE", conflicts_with = "set")]
     driver: Option<PathBuf>,
-    /// Folder for the calls behind failures and warnings, for `pilum replay`; default:
+    /// Folder for the calls of failures and warnings, for `pilum replay`; default:
     /// `results/check/<library>`.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Print only the checks that failed or crashed, and warnings.
+    /// Print only failures, crashes and warnings.
     #[arg(long)]
     only_failed: bool,
-    /// End with exit code 3 where a check warns, too.
+    /// Exit code 3 for warnings, too.
     #[arg(long)]
     strict: bool,
     /// Seconds after which a check is ended.
@@ -89,8 +88,8 @@ pub struct Arguments {
     /// List the checks.
     #[arg(long)]
     list: bool,
-    /// Run the checks in this process, one after the other, for a debugger: a law that crashes or
-    /// hangs takes the program with it, and there are no limits of time and memory.
+    /// Run the checks in this process, one by one, for a debugger: a crash ends the program, and
+    /// there are no limits of time and memory.
     #[arg(long)]
     in_process: bool,
     /// Run the one check as a child; its answer is the last line, or next to the file of its calls.

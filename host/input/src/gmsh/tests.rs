@@ -339,10 +339,7 @@ fn all_formats_give_the_same_mesh() {
     let (mesh, notes) = &meshes[0];
     assert_eq!(mesh.nodes.len(), 14);
     let shapes: Vec<_> = mesh.solids.iter().map(|s| (s.kind(), s.group)).collect();
-    assert_eq!(
-        shapes,
-        [(&QUAD8, 0), (&TRI6, 1), (&TRI6, 1)]
-    );
+    assert_eq!(shapes, [(&QUAD8, 0), (&TRI6, 1), (&TRI6, 1)]);
     // The one that was inside out, turned.
     assert_eq!(mesh.solids[2].nodes(), [1, 5, 2, 13, 12, 7]);
     let edges = |name: &str| mesh.lines[name].edges.clone();

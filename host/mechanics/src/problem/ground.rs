@@ -148,9 +148,9 @@ impl Water {
 )]
 #[serde(rename_all = "snake_case")]
 pub enum Drainage {
-    /// Freely.
+    /// It leaves freely.
     #[default]
     Drained,
-    /// Not at all: it resists compression.
+    /// It does not leave, and resists compression.
     Undrained,
 }

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
 
-/// What a law says of itself: name, version, parameters with units, bounds and meaning, hypotheses, internal
+/// Description of a law: name, version, parameters with units, bounds and meaning, hypotheses, internal
 /// variables.
 #[pyfunction]
 #[pyo3(signature = (id, /, *, law_path=None))]
@@ -25,7 +25,7 @@ pub(crate) fn describe(
     Ok(py.import("json")?.call_method1("loads", (text,))?.unbind())
 }
 
-/// Ids of all laws that are found, with their libraries. Nothing of them is executed.
+/// Ids of all laws found, with their libraries, which are not executed.
 #[pyfunction]
 #[pyo3(signature = (*, law_path=None))]
 pub(crate) fn laws(py: Python<'_>, law_path: Option<Vec<PathBuf>>) -> PyResult<Bound<'_, PyDict>> {

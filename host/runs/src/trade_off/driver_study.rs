@@ -130,7 +130,7 @@ fn find_reference(
     };
     let other = |(other, its_rows, _): (Reference, Sampled, Vec<f64>)| {
         format!(
-            "{} differs from the reference by {:.1e}, its own estimate is {:.1e}",
+            "{}: {:.1e} from the reference, own estimate {:.1e}",
             other.label,
             its_rows.difference(&rows, &scale),
             other.convergence.uncertainty

@@ -264,8 +264,8 @@ impl<'a> Interface<'a> {
                 Err(failure) => writeln!(text, "{start}  failed: {failure}"),
             };
         }
-        text += "\npenetration: largest compression / K_n / h. conditioning: largest over smallest diagonal entry of the elastic\n\
-                 stiffness of the interface and the elements beside it. change: largest relative change of a probe since the row above.\n";
+        text += "\npenetration: largest compression / (K_n h). conditioning: largest / smallest diagonal entry of the elastic stiffness of\n\
+                 the interface and the elements at it. change: largest relative change of a probe since the row above.\n";
         let _ = writeln!(text, "{}", plateau(tried));
         text
     }
@@ -293,8 +293,8 @@ fn plateau(tried: &[Tried]) -> String {
     }
     let (first, Answer { penetration, .. }) = answers[answers.len() - 1 - steps];
     format!(
-        "plateau: from f = {} to {} no probe changes by 1 % from one value to the next; at f = {}: \
-         K_n = {:.2e}, K_t = {:.2e} kPa/m, penetration {penetration:.1e} of the element beside",
+        "plateau: from f = {} to {} no probe changes by 1 % from row to row; at f = {}: K_n = {:.2e}, K_t = {:.2e} kPa/m, \
+         penetration {penetration:.1e}",
         short(first.factor),
         short(last.factor),
         short(first.factor),

@@ -109,14 +109,14 @@ impl Reference {
         let differs = format!("{label}; differs by {difference:.1e} from {next}");
         match order {
             Some(order) if order <= 0.0 => format!(
-                "{differs}, no less than the next two from each other (observed order {order:.2}): the reference does not \
-                 converge, and how far it is from a limit is not known"
+                "{differs}, no less than the next two from each other (order {order:.2}): the reference does not converge, its \
+                 distance from a limit is unknown"
             ),
-            Some(order) => format!(
-                "{differs}, observed order {order:.2}: reference converged to {uncertainty:.0e}"
-            ),
+            Some(order) => {
+                format!("{differs}, order {order:.2}: reference converged to {uncertainty:.0e}")
+            }
             None => {
-                format!("{differs}, order not observed: reference converged to {uncertainty:.0e}")
+                format!("{differs}, order unknown: reference converged to {uncertainty:.0e}")
             }
         }
     }
@@ -171,7 +171,7 @@ impl Study {
         };
         let floor = self.references[row.reference].convergence.uncertainty;
         let error = if default.is_below {
-            format!("error below {floor:.0e}, the uncertainty of the reference")
+            format!("error below {floor:.0e}")
         } else {
             format!("error {}", percent(default.error))
         };
@@ -184,7 +184,10 @@ impl Study {
         };
         let compared = |(best, m): (&Row, &Measurement)| {
             let ratio = default.seconds / m.seconds;
-            format!("{ratio:.1}× the cost of the cheapest ({})", best.label)
+            format!(
+                "{ratio:.1}× the cost of the cheapest as accurate ({})",
+                best.label
+            )
         };
         let any = cheapest(&|_| true).map(compared);
         let rows = self.counts.iter().position(|name| *name == ROWS);
@@ -192,20 +195,16 @@ impl Study {
             let found = cheapest(&|m: &Measurement| m.counts[i] >= default.counts[i]);
             found.map(compared)
         });
-        let none = || "no cheaper one".to_owned();
+        let none = || "none as accurate is cheaper".to_owned();
         let found = match (any, of_as_many_rows) {
             (None, _) => none(),
             (Some(any), None) => any,
             (Some(any), Some(many)) if many.as_ref() == Some(&any) => any,
-            (Some(any), Some(many)) => format!(
-                "{any}; of those with as many rows: {}",
-                many.unwrap_or_else(none)
-            ),
+            (Some(any), Some(many)) => {
+                format!("{any}; with as many rows: {}", many.unwrap_or_else(none))
+            }
         };
-        format!(
-            "default ({}): {error}. Of the settings that are as accurate: {found}",
-            row.label
-        )
+        format!("default ({}): {error}; {found}", row.label)
     }
 }
 

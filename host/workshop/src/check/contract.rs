@@ -14,7 +14,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "create-works",
         family: Family::Contract,
-        description: "`create` accepts ordinary parameters for every hypothesis, `destroy` frees \
+        description: "`create` accepts ordinary parameters for every hypothesis; `destroy` frees \
                       the instance and accepts null.",
         needs: &["description-is-readable"],
         run: create_works,
@@ -22,8 +22,8 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "wrong-arguments-are-refused",
         family: Family::Contract,
-        description: "`create` refuses a wrong number of values, values at null and a formulation \
-                      that does not exist with PILUM_E_ARGUMENT, a message, and no instance.",
+        description: "`create` refuses a wrong number of values, values at null and an unknown \
+                      formulation with PILUM_E_ARGUMENT, a message, and no instance.",
         needs: &["create-works"],
         run: wrong_arguments_are_refused,
     },
@@ -31,41 +31,39 @@ pub(super) const CHECKS: &[Check] = &[
         id: "bounds-are-kept",
         family: Family::Contract,
         description: "`create` refuses values just outside each bound, NaN and infinities with \
-                      PILUM_E_PARAMETER and a message that starts with the parameter's id; at the \
-                      bounds it accepts or refuses.",
+                      PILUM_E_PARAMETER and a message that starts with the parameter's id.",
         needs: &["create-works"],
         run: bounds_are_kept,
     },
     Check {
         id: "initial-states-are-written",
         family: Family::Contract,
-        description: "Where `init_state` succeeds, it has written an outcome and all internal \
-                      variables, finite, of every point, the last one too.",
+        description: "If `init_state` succeeds, it has written an outcome and all internal \
+                      variables, finite, of every point.",
         needs: &["create-works"],
         run: initial_states_are_written,
     },
     Check {
         id: "integrate-works",
         family: Family::Contract,
-        description: "`integrate` and `init_state` return, in time, write an outcome for every \
-                      point, and report no defect of their own; some increments succeed.",
+        description: "`integrate` and `init_state` return in time, write an outcome for every \
+                      point and report no defect; some increments succeed.",
         needs: &["initial-states-are-written"],
         run: integrate_works,
     },
     Check {
         id: "unknown-requests-are-refused",
         family: Family::Contract,
-        description: "A request that the contract does not know, or one of rates to a law that \
-                      does not offer them, is refused with PILUM_E_UNSUPPORTED, and no outcomes are \
-                      written.",
+        description: "An unknown request, or one of rates to a law without them, is refused with \
+                      PILUM_E_UNSUPPORTED, without outcomes.",
         needs: &["integrate-works"],
         run: unknown_requests_are_refused,
     },
     Check {
         id: "missing-tangent-is-refused",
         family: Family::Contract,
-        description: "Where PILUM_T_NO_TANGENT is set, a request of the consistent tangent is \
-                      answered with PILUM_E_UNSUPPORTED.",
+        description: "With PILUM_T_NO_TANGENT a request of the consistent tangent gives \
+                      PILUM_E_UNSUPPORTED.",
         needs: &["integrate-works"],
         run: missing_tangent_is_refused,
     },
@@ -86,8 +84,8 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "messages-fit",
         family: Family::Contract,
-        description: "A failure writes a message that ends in NUL within its buffer, of 512, 16, \
-                      2, 1 or 0 bytes, and names the point by its number.",
+        description: "A failure writes a message that ends in NUL within its buffer of 512, 16, \
+                      2, 1 or 0 bytes, and has the number of the point.",
         needs: &["integrate-works"],
         run: messages_fit,
     },
@@ -103,7 +101,7 @@ pub(super) const CHECKS: &[Check] = &[
         id: "shorter-batch-is-refused",
         family: Family::Contract,
         description: "A batch shorter than in version 1.0 is refused with PILUM_E_ARGUMENT; \
-                      forbidden memory stands after its last byte.",
+                      forbidden memory follows its last byte.",
         needs: &["integrate-works"],
         run: shorter_batch_is_refused,
     },

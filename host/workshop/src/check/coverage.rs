@@ -12,18 +12,17 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "results-do-not-blow-up",
         family: Family::Mathematics,
-        description: "On the paths no flux and no internal variable exceeds 10³⁰, whatever its unit, as in a scheme that is \
-                      unstable or an exponential that nothing bounds; the other checks go no farther than there \
-                      (warning, since a path may be longer than is meant).",
+        description: "No flux or internal variable exceeds 10³⁰ on the paths, in whatever unit; \
+                      the other checks end there (warning, since a path may be too long).",
         needs: NEEDS,
         run: results_do_not_blow_up,
     },
     Check {
         id: "paths-leave-elasticity",
         family: Family::Mathematics,
-        description: "Where a law has internal variables, some increments of the paths are not elastic, or change one of \
-                  them after the first, else what comes after yielding was not looked at; no component of the flux for which the tangent has a stiffness \
-                  stays what it was in all of them (warning). Internal variables that never change are told.",
+        description: "With internal variables, some increments are inelastic or change one of \
+                      them; no component of the flux with a stiffness stays constant (warning). \
+                      Variables that never change are reported.",
         needs: NEEDS,
         run: paths_leave_elasticity,
     },

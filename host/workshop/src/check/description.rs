@@ -8,16 +8,16 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "description-is-readable",
         family: Family::Description,
-        description: "The tables can be read and make sense: plausible counts and sizes, UTF-8, \
-                      ids well-formed and unique, bounds in order, known gradients and fluxes.",
+        description: "The tables are readable and plausible: counts, sizes, UTF-8, well-formed \
+                      unique ids, bounds in order, known gradients and fluxes.",
         needs: &["entry-is-idempotent"],
         run: description_is_readable,
     },
     Check {
         id: "description-is-complete",
         family: Family::Description,
-        description: "No text is empty, initial values are finite, and every law offers a \
-                      hypothesis (warning). A sidecar needs no symbols, and no text on the law.",
+        description: "No text is empty, initial values are finite, every law offers a hypothesis \
+                      (warning). A sidecar needs no symbols and no text on the law.",
         needs: &["description-is-readable"],
         run: description_is_complete,
     },
@@ -25,15 +25,15 @@ pub(super) const CHECKS: &[Check] = &[
         id: "units-are-known",
         family: Family::Description,
         description: "Units are made of kPa, kN, kJ, m, mm, s, h, d, deg, rad, 1 and - (warning, \
-                      with the unit that was probably meant).",
+                      with the probable unit).",
         needs: &["description-is-readable"],
         run: units_are_known,
     },
     Check {
         id: "ranges-are-plausible",
         family: Family::Description,
-        description: "Usual ranges and defaults are within the bounds; angles are in degrees, and \
-                      their usual ranges look it (warning).",
+        description: "Usual ranges and defaults are within the bounds; angles and their usual \
+                      ranges are in degrees (warning).",
         needs: &["description-is-readable"],
         run: ranges_are_plausible,
     },

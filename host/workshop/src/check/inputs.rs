@@ -14,19 +14,19 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "parameters-matter",
         family: Family::Mathematics,
-        description: "Every parameter changes some result, and none with a unit, or whose default is no whole number, is \
-                      rounded to one (warning, since some may count only where no path leads).",
+        description: "Every parameter changes some result; none with a unit or a fractional \
+                      default is rounded to a whole number (warning, since some count only off \
+                      these paths).",
         needs: NEEDS,
         run: parameters_matter,
     },
     Check {
         id: "units-belong-together",
         family: Family::Mathematics,
-        description: "With all numbers in units of force, length or time that are half as large, a law \
-                      says the same in these: no number in it has a unit that no parameter has, as a \
-                      tolerance in kPa has (warning). Settled by a parameter with this unit and a default, or \
-                      by a sentence of the description that names the number, as 1 kPa in a logarithm: then \
-                      the check passes, and says so.",
+        description: "With units of force, length or time half as large a law gives the same \
+                      results: no hidden number has a unit that no parameter has, as a tolerance \
+                      in kPa (warning). A parameter with this unit and a default, or a sentence \
+                      that names the number, as 1 kPa in a logarithm, makes it pass with a note.",
         needs: NEEDS,
         run: units_belong_together,
     },

@@ -29,25 +29,23 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "entry-is-idempotent",
         family: Family::Load,
-        description: "`pilum_entry` returns, and the same pointer every time: again, from another \
-                      thread, to a host with a longer description.",
+        description: "`pilum_entry` returns the same pointer again, from another thread, and to \
+                      a host with a longer description.",
         needs: &["handshake-is-accepted"],
         run: entry_is_idempotent,
     },
     Check {
         id: "exports-are-hidden",
         family: Family::Load,
-        description: "The library exports the symbols of the contract, or of another one that it \
-                      keeps too (UMAT, MFront, CalculiX), and no others, which could disturb other \
-                      libraries (warning).",
+        description: "The library exports only the symbols of the contract, or of UMAT, MFront \
+                      or CalculiX; others could disturb other libraries (warning).",
         needs: &["file-is-a-library"],
         run: exports_are_hidden,
     },
     Check {
         id: "manifest-matches",
         family: Family::Load,
-        description: "The manifest, if there is one, lists the laws of the description with their \
-                      versions.",
+        description: "A manifest lists the laws of the description with their versions.",
         needs: &["description-is-readable"],
         run: manifest_matches,
     },

@@ -29,86 +29,83 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "tangent-matches-differences",
         family: Family::Mathematics,
-        description: "The consistent tangent is the derivative of the update, within 10⁻⁴ of the \
-                      elastic stiffness, on random paths and on those that go far, \
-                      there and back. Where differences to the two sides \
-                      disagree, the point is at a kink and exempt; so are laws that declare an \
-                      approximate tangent or none. A little stiffness where the flux does not change at \
-                      all is a warning.",
+        description: "The consistent tangent is the derivative of the update within 10⁻⁴ of the \
+                      elastic stiffness, on all paths. Exempt are kinks, where differences to \
+                      the two sides disagree, and laws that declare an approximate tangent or \
+                      none. A little stiffness where the flux does not change is a warning.",
         needs: NEEDS,
         run: tangent::tangent_matches_differences,
     },
     Check {
         id: "rates-match-differences",
         family: Family::Mathematics,
-        description: "Where PILUM_T_RATES is set, rates of flux and internal variables are the \
+        description: "With PILUM_T_RATES, rates of flux and internal variables are the \
                       derivative of the update in random directions, by parameters too, within \
-                      10⁻⁶ of the largest term, on random paths; kinks are exempt.",
+                      10⁻⁶ of the largest term; kinks are exempt.",
         needs: NEEDS,
         run: rates::rates_match_differences,
     },
     Check {
         id: "tangent-symmetry-as-declared",
         family: Family::Mathematics,
-        description: "Where PILUM_T_SYMMETRIC is set, the consistent tangent is symmetric on \
-                      random paths.",
+        description: "With PILUM_T_SYMMETRIC the consistent tangent is symmetric on random \
+                      paths.",
         needs: NEEDS,
         run: tangent::tangent_symmetry_as_declared,
     },
     Check {
         id: "linearity-as-declared",
         family: Family::Mathematics,
-        description: "Where PILUM_T_LINEAR is set, there is one tangent for all states, and it \
-                      predicts every update.",
+        description: "With PILUM_T_LINEAR one tangent holds for all states and predicts every \
+                      update.",
         needs: NEEDS,
         run: tangent::linearity_as_declared,
     },
     Check {
         id: "zero-increment-changes-nothing",
         family: Family::Mathematics,
-        description: "After an update, an increment of zero keeps flux and internal variables, 300 times \
-                      over too; laws that depend on time are passed over, and variables that count or \
-                      are a rate.",
+        description: "After an update, a zero increment keeps flux and internal variables, also \
+                      300 times. Exempt: laws that depend on time, counters and rates.",
         needs: NEEDS,
         run: zero_strain::zero_increment_changes_nothing,
     },
     Check {
         id: "initial-states-fit",
         family: Family::Mathematics,
-        description: "Where `init_state` makes internal variables fit the initial flux, an increment of \
-                      zero keeps both (warning, since a flux may be more than a law carries).",
+        description: "A zero increment keeps initial flux and the internal variables that \
+                      `init_state` fits to it (warning, since a law may not carry that flux).",
         needs: NEEDS,
         run: zero_strain::initial_states_fit,
     },
     Check {
         id: "hypotheses-agree",
         family: Family::Mathematics,
-        description: "Plane strain and axisymmetry give the stresses that 3D gives in a plane \
-                      (without 3D: plane strain those of axisymmetry); interfaces in two dimensions those of three.",
+        description: "Plane strain and axisymmetry give the stresses of 3D (without 3D: each \
+                      other's); interfaces in two dimensions those of three.",
         needs: NEEDS,
         run: axes::hypotheses_agree,
     },
     Check {
         id: "tangential-axis-is-arbitrary",
         family: Family::Mathematics,
-        description: "With the tangential axis of an interface reversed, the traction is the \
-                      same, reversed (warning, since a law may say otherwise in its `doc`).",
+        description: "With the tangential axis of an interface reversed, the traction is \
+                      reversed (warning, since the `doc` may say otherwise).",
         needs: NEEDS,
         run: axes::tangential_axis_is_arbitrary,
     },
     Check {
         id: "response-is-isotropic",
         family: Family::Mathematics,
-        description: "In rotated axes a solid gives the stresses, rotated, as it does not where shear \
-                      strains γ = 2ε are taken for ε; laws with PILUM_T_LOCAL_AXES are exempt (warning, \
-                      since a law may have directions).",
+        description: "In rotated axes a solid gives rotated stresses; it does not with γ = 2ε \
+                      taken for ε. PILUM_T_LOCAL_AXES is exempt (warning, since a law may have \
+                      directions).",
         needs: NEEDS,
         run: axes::response_is_isotropic,
     },
     Check {
         id: "compression-is-negative",
         family: Family::Mathematics,
-        description: "A law carries no more shear under tension than under as much compression \
+        description: "A law carries no more shear under tension than under equal compression \
                       (warning, since some may).",
         needs: NEEDS,
         run: signs::compression_is_negative,
@@ -116,17 +113,17 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "angles-are-degrees",
         family: Family::Mathematics,
-        description: "Parameters in deg do not repeat after 2π, as angles do that are taken for \
-                      radians, nor after 2π · π/180.",
+        description: "Parameters in deg do not repeat after 2π, as radians do, nor after 2π · \
+                      π/180.",
         needs: NEEDS,
         run: signs::angles_are_degrees,
     },
     Check {
         id: "plastic-work-is-not-negative",
         family: Family::Mathematics,
-        description: "With a constant elastic operator, flux times inelastic part of the \
-                      increment is not negative; laws that depend on time are passed over (warning, \
-                      since energy stored by hardening may come back).",
+        description: "With a constant elastic operator, flux times inelastic increment is not \
+                      negative; laws that depend on time are exempt (warning, since hardening \
+                      may release energy).",
         needs: NEEDS,
         run: signs::plastic_work_is_not_negative,
     },

@@ -10,41 +10,40 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "writes-stay-inside",
         family: Family::Memory,
-        description: "Nothing is written beside the outputs, nor between their cells. Forbidden \
-                      memory stands right after, then right before every output; touching it \
-                      crashes the check.",
+        description: "Nothing is written outside the outputs, nor between their cells. Forbidden \
+                      memory is right after, then right before every output; touching it crashes \
+                      the check.",
         needs: &["integrate-works"],
         run: writes_stay_inside,
     },
     Check {
         id: "reads-stay-inside",
         family: Family::Memory,
-        description: "Nothing is read beside the inputs. Forbidden memory stands right after, \
-                      then right before every input; touching it crashes the check.",
+        description: "Nothing is read outside the inputs; forbidden memory as for the outputs.",
         needs: &["integrate-works"],
         run: reads_stay_inside,
     },
     Check {
         id: "inputs-stay-untouched",
         family: Family::Memory,
-        description: "Inputs are in memory that cannot be written; trying it crashes the check.",
+        description: "Inputs are in memory that cannot be written; a write crashes the check.",
         needs: &["integrate-works"],
         run: inputs_stay_untouched,
     },
     Check {
         id: "results-are-finite",
         family: Family::Memory,
-        description: "Where success is claimed, every requested component is written and finite. \
-                      Outputs are NaN before the call.",
+        description: "With success every requested component is written (NaN before the call) \
+                      and finite.",
         needs: &["integrate-works"],
         run: results_are_finite,
     },
     Check {
         id: "memory-is-freed",
         family: Family::Memory,
-        description: "What is in use of the heap, and what is mapped, does not grow with calls of \
-                      `integrate`, good and failing, of `init_state`, nor with instances that are \
-                      created and destroyed, nor with refused ones.",
+        description: "Heap and mapped memory do not grow with calls of `integrate` and \
+                      `init_state`, good or failing, nor with instances created, destroyed or \
+                      refused.",
         needs: &["writes-stay-inside"],
         run: memory_is_freed,
     },

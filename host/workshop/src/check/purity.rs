@@ -16,8 +16,8 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "repeatable",
         family: Family::Purity,
-        description: "The same call gives the same bits, also after other calls, as do those below \
-                      for `init_state` too.",
+        description: "The same call gives the same bits, also after other calls. This and the \
+                      checks below include `init_state`.",
         needs: &[
             "results-are-finite",
             "writes-stay-inside",
@@ -43,76 +43,76 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "independent-of-request",
         family: Family::Purity,
-        description: "Flux and internal variables have the same bits whatever operator is asked for, \
-                      and whatever number the first point has (warning, where without the consistent \
-                      tangent no more than the last bits differ).",
+        description: "Flux and internal variables have the same bits for every requested \
+                      operator, and for every number of the first point (warning, if only last \
+                      bits differ without the consistent tangent).",
         needs: &["repeatable"],
         run: arguments::independent_of_request,
     },
     Check {
         id: "independent-of-time",
         family: Family::Purity,
-        description: "Results have the same bits at whatever time an increment begins; and, where no \
-                      parameter or internal variable has a unit of time, however long it takes, 0 too (warning, since a \
-                      law may age).",
+        description: "Results have the same bits at any time; without a parameter or variable in \
+                      a unit of time also for any duration, 0 too (warning, since a law may \
+                      age).",
         needs: &["repeatable"],
         run: arguments::independent_of_time,
     },
     Check {
         id: "independent-of-layout",
         family: Family::Purity,
-        description: "Results have the same bits whether values stand point by point, component \
-                      by component, with gaps, or inputs only once for all points.",
+        description: "Results have the same bits with values by points, by components, with \
+                      gaps, or with inputs once for all points.",
         needs: &["independent-of-split"],
         run: independent_of_layout,
     },
     Check {
         id: "independent-of-thread",
         family: Family::Purity,
-        description: "Eight threads that use one instance at the same time get the bits that one \
-                      gets.",
+        description: "Eight threads that use one instance at the same time get the same bits as \
+                      one.",
         needs: &["repeatable"],
         run: independent_of_thread,
     },
     Check {
         id: "instances-are-independent",
         family: Family::Purity,
-        description: "An instance gives the same bits while others with other parameters are \
-                      created, used and destroyed.",
+        description: "An instance gives the same bits while others are created, used and \
+                      destroyed.",
         needs: &["repeatable"],
         run: earlier_calls::instances_are_independent,
     },
     Check {
         id: "independent-of-earlier-calls",
         family: Family::Purity,
-        description: "A call gives the same bits after one that differs from it in a single input, \
+        description: "A call gives the same bits after one that differs in a single input, \
                       parameter, request or the time increment, by a half or by 10⁻⁹, and in an \
-                      instance that stands where another one stood.",
+                      instance at the address of another one.",
         needs: &["instances-are-independent"],
         run: earlier_calls::independent_of_earlier_calls,
     },
     Check {
         id: "independent-of-first-instance",
         family: Family::Purity,
-        description: "An instance gives the same bits after another one with other parameters as it gives as the \
-                      first one of a process of its own: no `static` is set by whoever comes first.",
+        description: "An instance gives the same bits as the first one of a process and after \
+                      one with other parameters: no `static` keeps the first values.",
         needs: &["independent-of-order", "independent-of-earlier-calls"],
         run: fresh_process::independent_of_first_instance,
     },
     Check {
         id: "independent-of-environment",
         family: Family::Purity,
-        description: "A process with another HOME, LANG, LC_ALL, TZ, USER and LOGNAME gives the same bits.",
+        description: "A process with other HOME, LANG, LC_ALL, TZ, USER and LOGNAME gives the \
+                      same bits.",
         needs: &["independent-of-first-instance"],
         run: fresh_process::independent_of_environment,
     },
     Check {
         id: "environment-is-left-alone",
         family: Family::Purity,
-        description: "Rounding, subnormal numbers, traps of arithmetic, locale, working directory, \
-                      signal handlers, alarms, limits, the mask of files and variables of the \
-                      environment are as before; no process was started, no thread and no open file \
-                      is left behind, and none is closed.",
+        description: "Rounding, subnormal numbers, arithmetic traps, locale, working directory, \
+                      signal handlers, alarms, limits, umask and environment stay; no process is \
+                      started, no thread or open file left behind, none closed.",
         needs: &["integrate-works"],
         run: environment::environment_is_left_alone,
     },

@@ -21,27 +21,26 @@ pub(super) const CHECKS: &[Check] = &[
         id: "elastic-operator-is-plausible",
         family: Family::Mathematics,
         description: "The elastic operator is symmetric, has no negative stiffness, and is the \
-                      consistent tangent of some very small increments, if need be in no time or in \
-                      very long ones (warning).",
+                      consistent tangent of some very small increments, if need be in no time or \
+                      in very long times (warning).",
         needs: NEEDS,
         run: elastic_operator_is_plausible,
     },
     Check {
         id: "response-is-continuous",
         family: Family::Mathematics,
-        description: "Along an increment the flux does not jump, as it does where branches do not \
-                      meet or where tolerances of yielding are wide. Exempt are jumps to or from no \
-                      flux at all, as where an interface opens, those with an internal variable \
-                      of unit - that switches by a half or more, and those of substeps within plastic \
-                      flow, up to 10⁻³, which are told (warning, since more may break).",
+        description: "Along an increment the flux does not jump. Exempt are jumps to or from \
+                      zero flux, with a switch of a variable of unit - by a half or more, and up \
+                      to 10⁻³ of substeps within plastic flow, which are reported (warning, \
+                      since more may break).",
         needs: NEEDS,
         run: response_is_continuous,
     },
     Check {
         id: "states-are-carried-on",
         family: Family::Mathematics,
-        description: "No internal variable is halved where an increment is done in two, and halved again \
-                      in four, as what is not added to its value at the start; what counts, and times, \
+        description: "No internal variable is halved when an increment is divided in two, and \
+                      again in four, as if not added to its initial value; counters and times \
                       are exempt (warning, since a law may keep the last increment's).",
         needs: NEEDS,
         run: states_are_carried_on,
@@ -49,9 +48,8 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "plastic-variables-rest",
         family: Family::Mathematics,
-        description: "An internal variable that is called plastic by its id or sentence does not change in an increment \
-                      whose flux and tangent are those of the elastic operator; laws that depend on time are \
-                      passed over (warning).",
+        description: "An internal variable called plastic by its id or sentence does not change \
+                      in an elastic increment; laws that depend on time are exempt (warning).",
         needs: NEEDS,
         run: plastic_variables_rest,
     },

@@ -18,7 +18,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "failing-points-stay-alone",
         family: Family::Robustness,
-        description: "A failing point changes no bit of the others, wherever it stands.",
+        description: "A failing point changes no bit of the others.",
         needs: &["independent-of-split", "bad-numbers-are-refused"],
         run: failing_points_stay_alone,
     },
@@ -26,8 +26,8 @@ pub(super) const CHECKS: &[Check] = &[
         id: "huge-steps-end-well",
         family: Family::Robustness,
         description: "Increments up to 10¹² times the elastic limit succeed with finite results, \
-                      or ask for a smaller step or fail with a message; a step factor is NaN or \
-                      in (0, 1).",
+                      ask for a smaller step or fail with a message; a step factor is NaN or in \
+                      (0, 1).",
         needs: &["results-are-finite", "writes-stay-inside"],
         run: huge_steps_end_well,
     },

@@ -32,71 +32,72 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "sidecar-is-read",
         family: Family::Routine,
-        description: "UMAT: the sidecar beside the library, or that of the driver, is there and makes sense; its \
-                      parameters have a default or a usual range, or are set (warning). (What is \
-                      asked of a UMAT here is asked of a UDSM and of MFront behaviours, too, along a driver.)",
+        description: "UMAT (or UDSM, MFront along a driver): its sidecar, or that of the driver, \
+                      is readable; parameters have a default, a usual range, or are set \
+                      (warning).",
         needs: &["file-is-a-library"],
         run: sidecar_is_read,
     },
     Check {
         id: "routine-answers",
         family: Family::Routine,
-        description: "UMAT: under every hypothesis of the sidecar the routine is found with all that it \
-                      calls, and a first call without any strain gives finite results.",
+        description: "UMAT: for every hypothesis of the sidecar the routine is found with all \
+                      that it calls, and a first call without strain gives finite results.",
         needs: &["sidecar-is-read"],
         run: routine_answers,
     },
     Check {
         id: "routine-stays-inside",
         family: Family::Routine,
-        description: "UMAT: on random paths and on those that go far, there and back, nothing is written or \
-                      read beyond an array, nor written over sizes, names and PROPS, and PNEWDT is sound; results are finite \
-                      on random ones; the process goes on: PNEWDT asks for a smaller increment, STOP and XIT end \
-                      it; a copy that is used up is a warning.",
+        description: "UMAT: on random and on far paths nothing is read or written outside \
+                      arrays, nor written over sizes, names and PROPS; PNEWDT is sound, results \
+                      on random paths are finite, and the process does not end by STOP or XIT. A \
+                      copy that is used up is a warning.",
         needs: &["routine-answers"],
         run: routine_stays_inside,
     },
     Check {
         id: "routine-is-repeatable",
         family: Family::Routine,
-        description: "UMAT: the same call gives the same bits after other calls, and in another image of \
-                      the library: nothing is kept in SAVE or COMMON from point to point. In another place \
-                      too, by NOEL, NPT, COORDS and CELENT (warning, since they may stand for properties).",
+        description: "UMAT: the same call gives the same bits after other calls and in another \
+                      image of the library: SAVE or COMMON keep nothing. With other NOEL, NPT, \
+                      COORDS and CELENT, too (warning, since they may mean properties).",
         needs: &["routine-stays-inside"],
         run: routine_is_repeatable,
     },
     Check {
         id: "routine-does-not-begin-again",
         family: Family::Routine,
-        description: "UMAT: where a phase begins, with KINC = 1 and TIME(1) = 0, a routine goes on from its internal \
-                      variables: STRESS is the same, and stays so in the next increment; with KSTEP = 1 too (warning). \
-                      Where a routine depends on the time, TIME(1) is a warning. After a call of another step the usual \
-                      one, made twice, gives the same both times.",
+        description: "UMAT: at the start of a phase, with KINC = 1 and TIME(1) = 0, a routine \
+                      goes on from its internal variables: STRESS is the same, also in the next \
+                      increment; with KSTEP = 1, too (warning). TIME(1) is a warning if the \
+                      routine depends on time. After a call of another step two equal calls give \
+                      the same.",
         needs: &["routine-is-repeatable"],
         run: phase_start::routine_does_not_begin_again,
     },
     Check {
         id: "routine-stays-at-rest",
         family: Family::Routine,
-        description: "UMAT: after an update, DSTRAN = 0 keeps STRESS; routines that depend on the time are \
-                      passed over.",
+        description: "UMAT: after an update, DSTRAN = 0 keeps STRESS; routines that depend on \
+                      time are exempt.",
         needs: &["routine-is-repeatable"],
         run: zero_strain::routine_stays_at_rest,
     },
     Check {
         id: "time-as-declared",
         family: Family::Routine,
-        description: "UMAT: DTIME or TIME changes the response where the sidecar says `time_dependent = \
-                      true`, and nowhere else (warning).",
+        description: "UMAT: DTIME or TIME changes the response if the sidecar has \
+                      `time_dependent = true`, and only then (warning).",
         needs: &["routine-is-repeatable"],
         run: time::time_as_declared,
     },
     Check {
         id: "ddsdde-matches-differences",
         family: Family::Routine,
-        description: "UMAT: DDSDDE is the derivative of STRESS within 10⁻⁴ of the stiffness, far beyond \
-                      yielding and in unloading too (warning, with the largest error); it is not the \
-                      transpose of it, and symmetric where the sidecar says so. Kinks are exempt; so is \
+        description: "UMAT: DDSDDE is the derivative of STRESS within 10⁻⁴ of the stiffness, \
+                      also far beyond yielding and in unloading (warning, with the largest \
+                      error), not its transpose, and symmetric if declared. Exempt: kinks and \
                       `tangent = \"approximate\"`.",
         needs: &["routine-is-repeatable"],
         run: tangent::ddsdde_matches_differences,
@@ -104,16 +105,16 @@ pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "routine-agrees-in-the-plane",
         family: Family::Routine,
-        description: "UMAT: with fewer components the routine gives what it gives with all of them: plane \
-                      strain and axisymmetry what 3d gives, interface_2d what interface_3d gives.",
+        description: "UMAT: with fewer components the routine gives the same: plane strain and \
+                      axisymmetry as 3d, interface_2d as interface_3d.",
         needs: &["routine-is-repeatable"],
         run: axes::routine_agrees_in_the_plane,
     },
     Check {
         id: "tangential-directions-are-alike",
         family: Family::Routine,
-        description: "UMAT: with the tangential directions of an interface turned (reversed in the plane), \
-                      the traction is the same, turned (warning).",
+        description: "UMAT: with the tangential directions of an interface turned (in the plane: \
+                      reversed), the traction turns alike (warning).",
         needs: &["routine-is-repeatable"],
         run: axes::tangential_directions_are_alike,
     },
