@@ -59,12 +59,11 @@ fn study(input: &Path, interface_stiffness: bool) -> (TempDir, String) {
 
 type Row = BTreeMap<String, String>;
 
-/// The rows worth a line: what nothing beats, the default, and what has as many increments; of a
-/// case all.
+/// The rows worth a line: what nothing beats, the default, and what changes a single setting.
 fn worth_a_line(rows: &[Row]) -> Vec<&Row> {
-    let default = rows.iter().find(|row| row["default"] == "true").unwrap();
-    let same = |row: &Row| row.get("increments") == default.get("increments");
-    let wanted = |row: &&Row| row["optimal"] == "true" || same(row);
+    let is = |row: &Row, mark: &str| row[mark] == "true";
+    let wanted =
+        |row: &&Row| is(row, "optimal") || is(row, "default") || !row["setting"].contains(", ");
     rows.iter().filter(wanted).collect()
 }
 
