@@ -43,10 +43,14 @@ fn later_headers(folder: &Path) -> PathBuf {
         let end = format!("}} pilum_{grown};");
         replace(&end, &format!("    uint64_t made_up[3];\n{end}"));
     }
+    for condition in ["static_assert", "_Static_assert"] {
+        let size = format!(" {condition}(sizeof(type) == (bytes)");
+        replace(&size, &format!(" {condition}(sizeof(type) >= (bytes)"));
+    }
     replace("#define PILUM_ABI_MINOR 0", "#define PILUM_ABI_MINOR 1");
     replace(
         "#define PILUM_LAYOUT_HASH UINT64_C(0x",
-        "#define PILUM_LAYOUT_HASH UINT64_C(0x1",
+        "#define PILUM_LAYOUT_HASH 1 ^ UINT64_C(0x",
     );
     fs::write(headers.join("pilum_law.h"), header).unwrap();
     headers
