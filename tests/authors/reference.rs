@@ -175,7 +175,7 @@ impl Schema {
                     takes = format!("as `{}`", explained[choice]);
                 }
                 Some(choice) => {
-                    takes = "choice".to_owned();
+                    "choice".clone_into(&mut takes);
                     explained.insert(choice, key);
                     for (label, means) in labels {
                         write!(meaning, "<br>`{label}`: {means}").unwrap();

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Places that may have `unsafe`, and their purpose. A folder has the name of the file it belongs to.
-const UNSAFE: [(&str, &str); 11] = [
+const UNSAFE: [(&str, &str); 10] = [
     ("abi/src/raw.rs", "types of C functions"),
     (
         "abi/src/access.rs",

@@ -526,7 +526,7 @@ fn ends_of(a: usize, b: usize) -> Ends {
 
 /// Sides of a triangle or quad: their ends, and where its nodes have the middle.
 fn sides(kind: Kind, nodes: &Nodes) -> impl Iterator<Item = (Ends, usize)> + use<'_> {
-    let n = kind.solid().map_or(0, |solid| solid.n_corners());
+    let n = kind.solid().map_or(0, element::Kind::n_corners);
     (0..n).map(move |side| (ends_of(nodes[side], nodes[(side + 1) % n]), n + side))
 }
 

@@ -124,7 +124,8 @@ impl Kind {
     /// Nodes in the middle between two faces, with the nodes on the faces on either side. `across` is the direction
     /// from face to face: 0 for ξ, 1 for η.
     pub(crate) fn between_faces(&self, across: usize) -> Vec<[usize; 3]> {
-        let at = |place: [f64; 2]| self.places.iter().position(|own| *own == place);
+        let bits = |place: &[f64; 2]| place.map(|x| (x + 0.0).to_bits());
+        let at = |place: [f64; 2]| self.places.iter().position(|own| bits(own) == bits(&place));
         let is_between = |place: &&[f64; 2]| place[across] == 0.0;
         let mut between: Vec<[f64; 2]> = self.places.iter().filter(is_between).copied().collect();
         between.sort_by(|a, b| a[1 - across].total_cmp(&b[1 - across]));

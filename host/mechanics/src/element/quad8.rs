@@ -14,7 +14,7 @@ pub static QUAD8: Kind = Kind {
     edges: &EDGES_OF_QUAD,
     gmsh: 16,
     vtk: 23,
-    points,
+    points: |integration, places| Some(points(integration, places)),
     best: Points::at(2, 2),
     fine: Points::at(3, 3),
     division,
@@ -56,12 +56,12 @@ pub(super) const REFERENCE: Reference<8> = Reference {
     }),
 };
 
-fn points(integration: Integration, places: &[[f64; 2]]) -> Option<Points> {
+fn points(integration: Integration, places: &[[f64; 2]]) -> Points {
     let linear_volume = |along| Points {
         along,
         strains: Strains::LinearVolume,
     };
-    Some(match integration {
+    match integration {
         Integration::BBar => linear_volume([3, 3]),
         Integration::Reduced => Points::at(2, 2),
         Integration::Projected => {
@@ -76,7 +76,7 @@ fn points(integration: Integration, places: &[[f64; 2]]) -> Option<Points> {
             }
         }
         _ => Points::at(3, 3),
-    })
+    }
 }
 
 /// Whether the first and third side, and the others, turn too much to be followed by two points along them.
