@@ -217,7 +217,7 @@ fn inspection_runs_nothing() {
     assert_eq!(found["bits"], 64);
     assert_eq!(found["laws"][0]["id"], "troubled");
     assert_eq!(found["laws"][0]["version"], "1.0");
-    assert_eq!(found["handshake"]["abi"], serde_json::json!([1, 1]));
+    assert_eq!(found["handshake"]["abi"], serde_json::json!([1, 0]));
     assert_eq!(found["handshake"]["sdk"], "test");
     let has = |list: &str, name: &str| {
         let names = found[list].as_array().unwrap();
