@@ -11,6 +11,7 @@ use std::f64::consts::PI;
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
+use tempfile::TempDir;
 use tests::case::{column, run_case};
 use text::Source;
 use toml::Value;
@@ -85,7 +86,7 @@ fn mesh_file(mesh: &Mesh, groups: &[&str]) -> String {
     file + "$EndElements\n"
 }
 
-/// Where the map of an 8-node quad has its middle: half the middles of its sides, less a quarter of its corners.
+/// The middle of an 8-node quad on its own map: half the middles of its sides, less a quarter of its corners.
 fn middle(nodes: impl Iterator<Item = [f64; 2]>) -> [f64; 2] {
     nodes.enumerate().fold([0.0; 2], |sum, (i, at)| {
         let part = if i < 4 { -0.25 } else { 0.5 };
@@ -128,9 +129,9 @@ fn with_middles(file: &str) -> String {
     out.join("\n") + "\n"
 }
 
-/// Variants of a case of `cases/verification`, with its 8-node quads made quads of 9 nodes. By variant: the values of a
-/// probe at the end.
-fn verified(case: &str, variants: &[&str], probes: &[&str]) -> Vec<Vec<f64>> {
+/// A case of `cases/verification` with its 8-node quads made quads of 9 nodes: a folder with the results of each variant
+/// in `out`.
+fn verified(case: &str) -> TempDir {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../cases/verification");
     let folder = tempfile::tempdir().unwrap();
     for entry in fs::read_dir(root.join(case)).unwrap() {
@@ -143,14 +144,8 @@ fn verified(case: &str, variants: &[&str], probes: &[&str]) -> Vec<Vec<f64>> {
         };
         fs::write(folder.path().join(name), text).unwrap();
     }
-    let out = folder.path().join("out");
-    run_case(&folder.path().join("case.toml"), &out).unwrap();
-    let last = |variant: &&str| {
-        let table = out.join(variant).join("history.csv");
-        let last = |probe: &&str| *column(&table, probe).last().unwrap();
-        probes.iter().map(last).collect()
-    };
-    variants.iter().map(last).collect()
+    run_case(&folder.path().join("case.toml"), &folder.path().join("out")).unwrap();
+    folder
 }
 
 /// Displacements of the walls against the closed form, on curved sides, nearly incompressible too: the same bounds as
@@ -158,25 +153,33 @@ fn verified(case: &str, variants: &[&str], probes: &[&str]) -> Vec<Vec<f64>> {
 #[test]
 fn a_hollow_sphere() {
     let (a, b, p, young) = (1.0_f64, 2.0_f64, 100.0, 3e4);
-    for (nu, variants) in [
-        (0.3, ["quads_2_nu_0.3", "quads_4_nu_0.3", "quads_8_nu_0.3"]),
-        (
-            0.4999,
-            [
-                "quads_2_nu_0.4999",
-                "quads_4_nu_0.4999",
-                "quads_8_nu_0.4999",
-            ],
-        ),
-    ] {
+    let folder = verified("thick_sphere");
+    for nu in [0.3, 0.4999] {
         let scale = p * a.powi(3) / (young * (b.powi(3) - a.powi(3)));
         let u = |r: f64| scale * ((1.0 - 2.0 * nu) * r + (1.0 + nu) * b.powi(3) / (2.0 * r * r));
-        let found = verified("thick_sphere", &variants, &["inner", "outer"]);
-        for ((variant, found), bound) in variants.iter().zip(found).zip([0.003, 2e-4, 2e-5]) {
-            for (found, exact) in found.iter().zip([u(a), u(b)]) {
-                let error = found / exact - 1.0;
-                assert!(error.abs() < bound, "{variant}: {error:.1e}");
+        for (mesh, bound) in [("quads_2", 0.003), ("quads_4", 2e-4), ("quads_8", 2e-5)] {
+            let variant = format!("{mesh}_nu_{nu}");
+            let table = folder.path().join("out").join(&variant).join("history.csv");
+            for (wall, r) in [("inner", a), ("outer", b)] {
+                let found = *column(&table, wall).last().unwrap();
+                let error = found / u(r) - 1.0;
+                assert!(error.abs() < bound, "{variant}, {wall}: {error:.1e}");
             }
+        }
+    }
+}
+
+/// Level ground at rest stays so: to rounding with straight sides, and as 8-node quads with `b_bar` on curved ones.
+#[test]
+fn level_ground() {
+    let folder = verified("level_ground");
+    for (mesh, bound) in [("straight_quads", 1e-13), ("wave_quads", 1e-4)] {
+        for kind in ["", "_plane", "_b_bar", "_plane_b_bar"] {
+            let results = folder.path().join("out").join(format!("{mesh}{kind}"));
+            let summary = fs::read_to_string(results.join("summary.json")).unwrap();
+            let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+            let out = summary["phases"][0]["out_of_balance"].as_f64().unwrap();
+            assert!(out < bound, "{mesh}{kind}: {out:.1e}");
         }
     }
 }

@@ -6,8 +6,9 @@
 //!
 //! # Adding a kind of solid elements
 //! A file with its [`Kind`], as `quad9` is, and its name in [`Kind::ALL`]: mesh, refinement, recovery, thin layers,
-//! readers and writers of files take everything else from there. `tests` runs all kinds: patch test, level
-//! ground, volumes, division. Elements that are no displacement elements with Gauss points implement [`Kinematics`].
+//! readers and writers of files take everything else from there. Two tables elsewhere list numbers of nodes: outlines in
+//! the report's `contours.js`, cells in the package's `_mesh.py`. `tests` runs all kinds: patch test, volumes, division;
+//! `tests/finite_element/nine_nodes.rs` shows closed forms. Elements that are no displacement elements with Gauss points implement [`Kinematics`].
 //!
 //! An interface element in addition has the places where it is inserted (`mesh::insert`).
 

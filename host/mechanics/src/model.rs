@@ -386,13 +386,8 @@ impl GroupBuilder<'_> {
             let axes = Axes::of_facet([b[0] - a[0], b[1] - a[1]]);
             elements.push((solid, axes, points));
             thickness.push(t);
-            middles.extend(
-                solid
-                    .kind()
-                    .between_faces(across)
-                    .into_iter()
-                    .map(|triple| triple.map(|i| solid.nodes()[i])),
-            );
+            let between = solid.kind().between_faces(across).into_iter();
+            middles.extend(between.map(|triple| triple.map(|i| solid.nodes()[i])));
         }
         self.refuse_normal_along()?;
         if integration == Integration::Mean {

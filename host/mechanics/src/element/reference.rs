@@ -23,7 +23,7 @@ pub(super) struct Reference<const N: usize> {
     pub(super) functions: Option<ProjectedOn>,
 }
 
-/// Functions that strains are projected on: as many as there are points.
+/// Functions that strains are projected on, one for each point.
 #[derive(Debug)]
 pub(super) struct ProjectedOn {
     /// The function that is one at the first point and zero at the other points of the law,
