@@ -1,9 +1,10 @@
 //! Errors of a simulation, as data, with their messages.
 
+use crate::check::Refusal;
 use crate::equilibrium::StepFailure;
 use crate::group::PointFailure;
 use crate::model::BuildError;
-use crate::problem::{Axis, Refusal};
+use crate::problem::Axis;
 use crate::settings::Control;
 use serde::{Deserialize, Serialize};
 use std::fmt;

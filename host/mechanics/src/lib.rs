@@ -5,7 +5,8 @@
 //! [`Watch`]es, and errors come back as data ([`Error`]).
 //!
 //! In the order in which data flows: [`problem`] and [`mesh`]; [`model`], which makes [`group`]s of
-//! [`element`]s of them, in the [`ground`]; [`assembly`] and [`equilibrium`]; [`simulation`].
+//! [`element`]s of them, in the [`ground`], and the [`check`]s above it; [`assembly`] and [`equilibrium`];
+//! [`simulation`].
 //!
 //! A slice of a pile, 0.2 m high, in elastic ground behind a thin layer of Coulomb's friction: the
 //! ground presses on it, and it is pushed down by two millimetres.
@@ -74,6 +75,7 @@
 //! ```
 
 pub mod assembly;
+pub mod check;
 pub mod element;
 pub mod equilibrium;
 mod error;

@@ -2,14 +2,15 @@
 //! can be checked before the first increment.
 
 use crate::assembly::Tie;
+use crate::check::{self, Cause, Item, Key, Refusal, constraints, plausibility, sign_check};
 use crate::element::kind::{Elements, Points};
 use crate::element::{Axes, Joint6, Kinematics, Mixed};
 use crate::ground::InitialStresses;
 use crate::group::{Group, PointFailure};
 use crate::mesh::{Mesh, Solid};
 use crate::problem::{
-    Analysis, Axis, Cause, ElementGroup, Formulation, InPlane, InitialStress, Integration, Item,
-    Key, Material, Problem, Refusal, check, constraints, plausibility, sign_check,
+    Analysis, Axis, ElementGroup, Formulation, InPlane, InitialStress, Integration, Material,
+    Problem,
 };
 use abi::Hypothesis;
 use law::Operator;

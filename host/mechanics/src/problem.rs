@@ -1,22 +1,10 @@
 //! A problem as plain values: mesh, groups with their laws, supports, phases with their
 //! loads, settings. Units: kN, m, kPa; tension positive.
 
-pub(crate) mod check;
-mod compatibility;
-pub(crate) mod constraints;
 mod ground;
-mod ineffective_loads;
-mod loads_on_interfaces;
-pub(crate) mod plausibility;
-mod refusal;
-mod restraint;
-pub(crate) mod sign_check;
 pub(crate) mod tied_dofs;
-mod uncovered_loads;
 
-pub use compatibility::{Compatibility, Incompatibility};
 pub use ground::{AtRest, Drainage, InitialStress, Profile, Ratio, Water};
-pub use refusal::{Cause, Item, JointFault, Key, Refusal};
 
 use crate::mesh::Mesh;
 use crate::settings::Settings;
@@ -57,6 +45,15 @@ impl Problem {
             phases: Vec::new(),
             settings: Settings::default(),
         }
+    }
+
+    /// For every group, whether it is active after this many phases.
+    pub fn active_after(&self, phases: usize) -> Vec<bool> {
+        let mut active: Vec<bool> = self.groups.iter().map(|group| group.is_active).collect();
+        for phase in &self.phases[..phases] {
+            phase.switch(&mut active);
+        }
+        active
     }
 
     /// Whether there is ground water in any phase.
@@ -234,6 +231,16 @@ impl Phase {
         self.time.unwrap_or(1.0)
     }
 
+    /// Takes over which groups it activates and deactivates; `active` is by group.
+    pub fn switch(&self, active: &mut [bool]) {
+        for &group in &self.activate {
+            active[group] = true;
+        }
+        for &group in &self.deactivate {
+            active[group] = false;
+        }
+    }
+
     /// A phase in which nothing changes.
     pub fn new(name: impl Into<String>, increments: usize) -> Self {
         Self {
@@ -286,6 +293,13 @@ pub struct Pressure {
     pub value: Profile,
 }
 
+impl Pressure {
+    /// Whether it is 0 everywhere: it takes off what was there.
+    pub(crate) fn is_none(&self) -> bool {
+        self.value.values().all(|value| value == 0.0)
+    }
+}
+
 /// A force on a line, spread evenly over it: kN of the whole turn, or kN/m.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Force {
@@ -295,6 +309,14 @@ pub struct Force {
     pub x: Option<f64>,
     /// In y (z).
     pub y: Option<f64>,
+}
+
+impl Force {
+    /// Whether all that it gives is 0: it takes off what was there.
+    pub(crate) fn is_none(&self) -> bool {
+        let given = [self.x, self.y].into_iter().flatten();
+        given.into_iter().all(|value| value == 0.0)
+    }
 }
 
 /// A coordinate direction.

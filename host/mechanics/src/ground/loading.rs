@@ -34,7 +34,7 @@ impl Loading {
         Self {
             unit_weight: problem.groups.iter().map(weight).collect(),
             water_level: problem.water.as_ref().map(|water| water.level.clone()),
-            active: problem.groups.iter().map(|group| group.is_active).collect(),
+            active: problem.active_after(0),
             ..Self::default()
         }
     }
@@ -43,12 +43,7 @@ impl Loading {
     #[must_use]
     pub fn changed_by(&self, phase: &Phase) -> Self {
         let mut changed = self.clone();
-        for &group in &phase.activate {
-            changed.active[group] = true;
-        }
-        for &group in &phase.deactivate {
-            changed.active[group] = false;
-        }
+        phase.switch(&mut changed.active);
         for &(group, weight) in &phase.unit_weight {
             changed.unit_weight[group] = [weight; 2];
         }

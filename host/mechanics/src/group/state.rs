@@ -1,11 +1,79 @@
-//! What a group carries from one increment to the next: taken, held against the group, and taken up again.
+//! The state of a group: strains, stresses and internal variables of all points, before and during an increment; what
+//! the group carries from one increment to the next, taken, held against the group, and taken up again.
 
-use super::broken_bonds::Bond;
-use super::water::Pores;
-use super::{Field, Group, LawCalls, Origin};
+mod probed_elements;
+mod set_aside;
+
+pub use probed_elements::Excerpted;
+pub use set_aside::Aside;
+
+use super::diagnosis::Bond;
+use super::integration::{LawCalls, Origin, Pores};
+use super::{Group, PER_TASK};
 use crate::problem::Material;
+use algebra::threads;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
+
+/// Copies values of points.
+pub(super) fn copy(from: &[f64], to: &mut [f64]) {
+    let pieces = to.chunks_mut(4 * PER_TASK).zip(from.chunks(4 * PER_TASK));
+    threads::each(pieces, |(to, from)| to.copy_from_slice(from));
+}
+
+/// Values of all points, before and during an increment.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Field {
+    /// At the start of the increment.
+    pub committed: Vec<f64>,
+    /// As of the last iteration; empty before the first one of a phase.
+    #[serde(skip)]
+    pub trial: Vec<f64>,
+}
+
+impl Field {
+    pub(in crate::group) fn new(committed: Vec<f64>) -> Self {
+        Self {
+            committed,
+            trial: Vec::new(),
+        }
+    }
+
+    /// Makes room for a trial state.
+    pub(in crate::group) fn begin(&mut self) {
+        if self.trial.len() != self.committed.len() {
+            self.trial.clone_from(&self.committed);
+        }
+    }
+
+    pub(in crate::group) fn commit(&mut self) {
+        if !self.trial.is_empty() {
+            copy(&self.trial, &mut self.committed);
+        }
+    }
+
+    pub(in crate::group) fn forget_trial(&mut self) {
+        self.trial = Vec::new();
+    }
+}
+
+/// Committed state of a group: strains, stresses, internal variables, jumps of a layer, and pore
+/// pressures.
+#[derive(Clone, Debug)]
+pub struct Committed(Vec<Vec<f64>>);
+
+/// Bytes that a group keeps for its points.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct Bytes {
+    /// Strains, before and during an increment; of a thin layer also jumps.
+    pub strain: usize,
+    /// Stresses, before and during an increment.
+    pub stress: usize,
+    /// Internal variables, before and during an increment.
+    pub internal: usize,
+    /// Tangents.
+    pub tangents: usize,
+}
 
 /// What a group carries from one increment to the next.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -63,9 +131,9 @@ impl Group {
             jump: jump.into(),
             stiffness: stiffness.into(),
             law_calls: (&self.law_calls).into(),
-            tangent: with_tangents.then(|| (&self.tangent).into()),
+            tangent: with_tangents.then(|| (&self.tangents.values).into()),
             pores: self.pores.as_ref().map(Cow::Borrowed),
-            origin: self.origin,
+            origin: self.tangents.origin,
             bond: self.bond,
         }
     }
@@ -120,15 +188,61 @@ impl Group {
             layer.stiffness = state.stiffness.into_owned();
         }
         if let Some(tangent) = state.tangent {
-            if tangent.len() != self.tangent.len() {
+            if tangent.len() != self.tangents.values.len() {
                 return Err(format!("the state is not that of group `{}`", self.name));
             }
-            self.tangent = tangent.into_owned();
+            self.tangents.values = tangent.into_owned();
         }
         self.law_calls = state.law_calls.into_owned();
-        self.origin = state.origin;
+        self.tangents.origin = state.origin;
         self.bond = state.bond;
         self.forget_trial();
         Ok(())
+    }
+
+    /// Makes the trial state the committed one.
+    pub fn commit(&mut self) {
+        self.fields().for_each(Field::commit);
+    }
+
+    /// The committed state of all points, to be restored.
+    pub fn committed(&self) -> Committed {
+        let jump = self.layer.as_ref().map(|layer| &layer.jump);
+        let excess = self.pores.as_ref().map(|pores| &pores.excess);
+        let own = [&self.strain, &self.stress, &self.internal];
+        let fields = own.into_iter().chain(jump).chain(excess);
+        Committed(fields.map(|field| field.committed.clone()).collect())
+    }
+
+    /// Takes a committed state back.
+    pub fn restore_committed(&mut self, committed: Committed) {
+        for (field, committed) in self.fields().zip(committed.0) {
+            field.committed = committed;
+        }
+    }
+
+    /// Gives up the room of the trial state until the next one is computed.
+    pub fn forget_trial(&mut self) {
+        self.is_asked = false;
+        self.fields().for_each(Field::forget_trial);
+    }
+
+    pub(super) fn fields(&mut self) -> impl Iterator<Item = &mut Field> {
+        let jump = self.layer.as_mut().map(|layer| &mut layer.jump);
+        let excess = self.pores.as_mut().map(|pores| &mut pores.excess);
+        let others = [&mut self.strain, &mut self.stress, &mut self.internal];
+        others.into_iter().chain(jump).chain(excess)
+    }
+
+    /// What the group keeps for its points. A trial state as large comes and goes.
+    pub fn bytes(&self) -> Bytes {
+        let field = |field: &Field| size_of_val(&*field.committed);
+        let jumps = self.layer.as_ref().map_or(0, |layer| field(&layer.jump));
+        Bytes {
+            strain: field(&self.strain) + jumps,
+            stress: field(&self.stress),
+            internal: field(&self.internal),
+            tangents: size_of_val(&*self.tangents.values),
+        }
     }
 }

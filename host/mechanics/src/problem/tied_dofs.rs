@@ -15,15 +15,12 @@ pub(crate) struct TiedDofs {
 }
 
 impl TiedDofs {
-    /// In a phase, by number, in which these groups are there.
-    pub(crate) fn in_phase(
-        problem: &Problem,
-        number: usize,
-        is_active: impl Fn(usize) -> bool,
-    ) -> Self {
+    /// In a phase, by number.
+    pub(crate) fn in_phase(problem: &Problem, number: usize) -> Self {
         let mut alike = Self::default();
         let mesh = &problem.mesh;
-        for joint in mesh.joints.iter().filter(|joint| !is_active(joint.group)) {
+        let active = problem.active_after(number + 1);
+        for joint in mesh.joints.iter().filter(|joint| !active[joint.group]) {
             for (&minus, &plus) in joint.minus.iter().zip(&joint.plus) {
                 alike.join_nodes(minus, plus);
             }

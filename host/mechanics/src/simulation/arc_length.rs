@@ -213,15 +213,9 @@ impl Simulation {
             ..self.problem.settings
         };
         let clock = self.clock(phase.number);
-        let mut newton = Newton::new(
-            (&equations.system, &equations.places),
-            equations.domain.as_ref(),
-            (&mut equations.solver, &mut equations.matrix),
-            &mut self.groups,
-            &settings,
-            &mut phase.record.costs,
-        );
-        newton = newton.stopped_by(&self.stop);
+        let (equations, costs) = (equations.iterated(), &mut phase.record.costs);
+        let mut newton =
+            Newton::new(equations, &mut self.groups, &settings, costs).stopped_by(&self.stop);
         newton.step_along(
             &course.loads,
             (course.lambda, clock),

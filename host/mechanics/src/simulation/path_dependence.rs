@@ -8,7 +8,7 @@
 use super::phase::PhaseEquations;
 use super::{Simulation, UnderWay, Warning, Watch};
 use crate::assembly::fold;
-use crate::equilibrium::{Costs, Matrix, Newton, StepSuccess, norm};
+use crate::equilibrium::{Costs, Equations, Matrix, Newton, StepSuccess, norm};
 use crate::error::Place;
 use crate::group::{Aside, Group};
 use crate::settings::{Control, Settings};
@@ -116,15 +116,15 @@ impl Simulation {
         let mut matrix = Matrix::resumed(equations.matrix.largest());
         let mut costs = Costs::default();
         let clock = self.clock(phase.number);
-        let mut newton = Newton::new(
-            (&equations.system, &equations.places),
-            equations.domain.as_ref(),
-            (&mut solver, &mut matrix),
-            &mut self.groups,
-            &settings,
-            &mut costs,
-        )
-        .stopped_by(&self.stop);
+        let equations_of_trial = Equations {
+            system: &equations.system,
+            places: &equations.places,
+            domain: equations.domain.as_ref(),
+            solver: &mut solver,
+            matrix: &mut matrix,
+        };
+        let mut newton = Newton::new(equations_of_trial, &mut self.groups, &settings, &mut costs)
+            .stopped_by(&self.stop);
         let (loads, history) = (&phase.course.loads, &phase.course.history);
         let other = match trial {
             Trial::Viscous => newton.step(loads, [from, to], clock, None),

@@ -6,11 +6,11 @@ use super::state::PhaseCourse;
 use super::{PhaseRecord, Simulation, UnderWay, Warning, Watch};
 use crate::assembly::{Bodies, Places, System, fold};
 use crate::element::Kinematics;
-use crate::equilibrium::{Costs, Held, LinearDomain, Loads, Matrix, Newton, ROUND_OFF};
+use crate::equilibrium::{Costs, Equations, Held, LinearDomain, Loads, Matrix, Newton, ROUND_OFF};
 use crate::error::Error;
 use crate::group::Group;
 use crate::problem::Axis;
-use crate::settings::{Equations, Method, Settings};
+use crate::settings::{self, Method, Settings};
 use algebra::{Block, LinearSolver, Singular};
 
 /// The equations of one phase.
@@ -47,6 +47,17 @@ impl PhaseEquations {
         let domain = self.domain.as_ref().is_some_and(|domain| domain.factorised);
         let factorisations = self.solver.factorisations + u64::from(domain);
         [factorisations, self.solver.fallbacks]
+    }
+
+    /// The equations for iterations.
+    pub(super) fn iterated(&mut self) -> Equations<'_> {
+        Equations {
+            system: &self.system,
+            places: &self.places,
+            domain: self.domain.as_ref(),
+            solver: &mut self.solver,
+            matrix: &mut self.matrix,
+        }
     }
 
     /// The record of the phase with all that has been counted.
@@ -317,16 +328,9 @@ impl Simulation {
         if let Some(course) = course {
             if course.has_matrix {
                 let settings = self.settings();
-                let restored = Newton::new(
-                    (&equations.system, &equations.places),
-                    equations.domain.as_ref(),
-                    (&mut equations.solver, &mut equations.matrix),
-                    &mut self.groups,
-                    &settings,
-                    &mut Costs::default(),
-                )
-                .restore_matrix();
-                restored.map_err(|_| Singular)?;
+                let (groups, mut costs) = (&mut self.groups, Costs::default());
+                let mut newton = Newton::new(equations.iterated(), groups, &settings, &mut costs);
+                newton.restore_matrix().map_err(|_| Singular)?;
             }
             // What was counted before counts on, without what it took to get here again.
             let [factorisations, fallbacks] = equations.counts();
@@ -348,11 +352,11 @@ impl Simulation {
     ) -> Option<(LinearDomain, System)> {
         self.reuse.is_last_phase = number + 1 == self.problem.phases.len();
         let wanted = self.problem.settings.equations;
-        if wanted == Equations::Sparse {
+        if wanted == settings::Equations::Sparse {
             return None;
         }
         // Groups that are held by the others alone cannot be condensed.
-        let always = wanted == Equations::Condensed;
+        let always = wanted == settings::Equations::Condensed;
         let (groups, ties, lines) = (&self.groups, &self.tied, &self.lines);
         let held = Held {
             now: is_prescribed,

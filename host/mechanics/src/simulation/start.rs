@@ -2,13 +2,14 @@
 
 use super::loads::Prescribed;
 use super::{Simulation, Warning, Watch};
+use crate::check::{Cause, Item, Key, Refusal};
 use crate::element::Axes;
 use crate::equilibrium::StepFailure;
 use crate::error::{Error, Place};
 use crate::ground::beside_joints;
 use crate::group::Group;
 use crate::model::Model;
-use crate::problem::{Cause, Formulation, InitialStress, Item, Key, Refusal};
+use crate::problem::{Formulation, InitialStress};
 use abi::status::Outcome;
 use law::Moment;
 
@@ -96,32 +97,43 @@ impl Simulation {
                 self.ask_law(group, number, watch)?;
             }
         }
-        for (number_of, group) in self.groups.iter_mut().enumerate() {
-            let own = &self.problem.groups[number_of];
-            let is_changed = phase.drainage.iter().any(|(of, _)| *of == number_of);
-            // The stiffness of the pore water follows from that of the law.
-            if group.is_active && (is_changed || starts[number_of]) {
-                group.moment = moment;
-                let drainage = self.problem.drainage(number_of, number);
-                let set = group.set_drainage(drainage, own.undrained_poisson_ratio);
-                match set.map_err(cannot_start)? {
-                    Ok(()) => {}
-                    Err(ratio) => {
-                        let cause = Cause::NoPoreStiffness {
-                            group: own.name.clone(),
-                            undrained: own.undrained_poisson_ratio,
-                            drained: ratio,
-                        };
-                        let item = Item::GroupKey(number_of, Key::UndrainedPoissonRatio);
-                        return Err(Refusal::new(item, cause).into());
-                    }
-                }
-            }
-        }
+        self.set_drainages(number, &starts, moment)?;
         let prescribed = self.take_loads(number, watch)?;
         // The equations of the phase are set up in the room of trial states.
         self.groups.iter_mut().for_each(Group::forget_trial);
         Ok(prescribed)
+    }
+
+    /// Undrained from now on, or drained again: groups of which a phase says so, and those whose law starts. The
+    /// stiffness of the pore water follows from that of the law.
+    fn set_drainages(
+        &mut self,
+        number: usize,
+        starts: &[bool],
+        moment: Moment,
+    ) -> Result<(), Error> {
+        let changed = &self.problem.phases[number].drainage;
+        for (of, group) in self.groups.iter_mut().enumerate() {
+            let is_changed = changed.iter().any(|(group, _)| *group == of);
+            if !(group.is_active && (is_changed || starts[of])) {
+                continue;
+            }
+            group.moment = moment;
+            let own = &self.problem.groups[of];
+            let drainage = self.problem.drainage(of, number);
+            let set = group.set_drainage(drainage, own.undrained_poisson_ratio);
+            let set = set.map_err(|failure| Error::CannotStart(Box::new(failure)))?;
+            if let Err(ratio) = set {
+                let cause = Cause::NoPoreStiffness {
+                    group: own.name.clone(),
+                    undrained: own.undrained_poisson_ratio,
+                    drained: ratio,
+                };
+                let item = Item::GroupKey(of, Key::UndrainedPoissonRatio);
+                return Err(Refusal::new(item, cause).into());
+            }
+        }
+        Ok(())
     }
 
     /// Stress with which a group appears: none in solids; in interfaces that computed next to them, in

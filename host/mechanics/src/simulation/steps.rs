@@ -305,16 +305,8 @@ impl Simulation {
             ..self.settings()
         };
         let clock = self.clock(phase.number);
-        let equations = &mut phase.equations;
-        let mut newton = Newton::new(
-            (&equations.system, &equations.places),
-            equations.domain.as_ref(),
-            (&mut equations.solver, &mut equations.matrix),
-            &mut self.groups,
-            &settings,
-            &mut phase.record.costs,
-        );
-        newton = newton
+        let (equations, costs) = (phase.equations.iterated(), &mut phase.record.costs);
+        let mut newton = Newton::new(equations, &mut self.groups, &settings, costs)
             .stopped_by(&self.stop)
             .taking_single_corrections(singly);
         newton.step(&phase.course.loads, [from, to], clock, guess)

@@ -3,9 +3,10 @@
 use super::Simulation;
 use super::loads::{Prescribed, part};
 use crate::assembly::Tie;
+use crate::check::{Cause, Item, Refusal};
 use crate::error::Error;
 use crate::problem::tied_dofs::TiedDofs;
-use crate::problem::{Cause, Item, Refusal};
+
 use std::collections::{HashMap, HashSet};
 
 /// Two prescribed displacements that differ by less, as a fraction of the larger, are the same.
@@ -71,7 +72,7 @@ impl Simulation {
         number: usize,
         mut prescribed: Vec<Prescribed>,
     ) -> Result<Tied, Error> {
-        let alike = TiedDofs::in_phase(&self.problem, number, |group| self.groups[group].is_active);
+        let alike = TiedDofs::in_phase(&self.problem, number);
         let held = alike.still.clone();
         let own: HashMap<usize, [f64; 2]> = prescribed
             .iter()
@@ -158,9 +159,6 @@ impl Simulation {
         let outcome = self.follow_alike();
         self.prescribed = before;
         self.displacement.fill(0.0);
-        for (group, input) in self.groups.iter_mut().zip(&self.problem.groups) {
-            group.is_active = input.is_active;
-        }
         outcome
     }
 
@@ -169,11 +167,6 @@ impl Simulation {
         for number in 0..self.problem.phases.len() {
             let phase = &self.problem.phases[number];
             let factor = phase.course.last().map_or(1.0, |&[_, factor]| factor);
-            for (groups, is_active) in [(&phase.activate, true), (&phase.deactivate, false)] {
-                for &group in groups {
-                    self.groups[group].is_active = is_active;
-                }
-            }
             if phase.reset_displacements {
                 is_known.fill(true);
             }

@@ -1,10 +1,10 @@
 //! Results beyond what the theory of small strains, or any material, covers. They are computed all
 //! the same, and said.
 
+use crate::check::plausibility::{LARGE, implausible_stiffness};
 use crate::element::depth;
 use crate::group::Group;
 use crate::mesh::Mesh;
-use crate::problem::plausibility::{LARGE, implausible_stiffness};
 use crate::problem::{Analysis, Formulation};
 use std::collections::HashSet;
 

@@ -183,12 +183,7 @@ impl fmt::Display for Warning {
                 phase,
                 tolerance,
                 left,
-            } => write!(
-                f,
-                "phase `{phase}`: `displacement_tolerance` {tolerance:.1e} is below round-off: residuals are within their \
-                 tolerance, and what is left of them is the last bit of the displacements; last corrections are up to \
-                 {left:.1e} of the increment"
-            ),
+            } => unsettled(f, phase, [*tolerance, *left]),
             Self::Viscous(place) => write!(
                 f,
                 "{place}: Newton iterations stalled; viscous control found the next equilibrium. {COMPARE}"
@@ -252,6 +247,15 @@ impl fmt::Display for Warning {
             ),
         }
     }
+}
+
+fn unsettled(f: &mut fmt::Formatter<'_>, phase: &str, [tolerance, left]: [f64; 2]) -> fmt::Result {
+    write!(
+        f,
+        "phase `{phase}`: `displacement_tolerance` {tolerance:.1e} is below round-off: residuals are within their \
+         tolerance, and what is left of them is the last bit of the displacements; last corrections are up to \
+         {left:.1e} of the increment"
+    )
 }
 
 fn tolerated(

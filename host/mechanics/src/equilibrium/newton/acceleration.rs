@@ -24,7 +24,7 @@ const PROGRESS: f64 = 0.1;
 
 /// Moves so far, the last one at the end.
 #[derive(Debug, Default)]
-pub(super) struct Acceleration {
+pub(in crate::equilibrium) struct Acceleration {
     /// s_i and y_i, by place.
     moves: Vec<[Vec<f64>; 2]>,
     /// f, and the move taken from there.
@@ -35,7 +35,7 @@ pub(super) struct Acceleration {
 
 impl Acceleration {
     /// Without moves, for a matrix that has been renewed at this iteration.
-    pub(super) fn since(iteration: usize) -> Self {
+    pub(in crate::equilibrium) fn since(iteration: usize) -> Self {
         Self {
             since: iteration,
             ..Self::default()
@@ -43,12 +43,12 @@ impl Acceleration {
     }
 
     /// Where the iterations with the present matrix start.
-    pub(super) fn begins(&self) -> usize {
+    pub(in crate::equilibrium) fn begins(&self) -> usize {
         self.since
     }
 
     /// Whether the iterations with the present matrix make too little progress.
-    pub(super) fn stalls(&self, iterations: &[Iteration]) -> bool {
+    pub(in crate::equilibrium) fn stalls(&self, iterations: &[Iteration]) -> bool {
         let Some([before, .., last]) = iterations[self.since..].last_chunk::<PATIENCE>() else {
             return false;
         };
@@ -56,7 +56,7 @@ impl Acceleration {
     }
 
     /// δ from f.
-    pub(super) fn improve(&mut self, correction: Vec<f64>) -> Vec<f64> {
+    pub(in crate::equilibrium) fn improve(&mut self, correction: Vec<f64>) -> Vec<f64> {
         if let Some([before, moved]) = self.last.take() {
             if self.moves.len() == DEPTH {
                 self.moves.remove(0);
@@ -93,7 +93,7 @@ impl Acceleration {
     }
 
     /// This share of δ was taken.
-    pub(super) fn took(&mut self, improved: &[f64], share: f64) {
+    pub(in crate::equilibrium) fn took(&mut self, improved: &[f64], share: f64) {
         if let Some([_, moved]) = &mut self.last {
             moved.extend(improved.iter().map(|d| share * d));
         }

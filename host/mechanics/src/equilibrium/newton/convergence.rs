@@ -18,22 +18,24 @@ impl Newton<'_> {
     }
 
     /// The same, by what it led to: a balance and displacement increments.
-    pub(super) fn took_to(
+    pub(in crate::equilibrium) fn took_to(
         &mut self,
         at: &Balance,
         correction: &[f64],
         moved: &[f64],
         length: f64,
     ) -> Iteration {
-        self.changes = self.changes(correction, moved);
+        self.reference.changes = self.changes(correction, moved);
         // Of several bodies one that is at rest has nothing to correct.
         let criteria = self.criteria(false);
         let moving = self
             .measures(at, length >= 1.0)
             .into_iter()
-            .zip(&self.changes);
+            .zip(&self.reference.changes);
         let relative = moving
-            .filter(|(measures, _)| self.changes.len() == 1 || !measures.is_exact(criteria))
+            .filter(|(measures, _)| {
+                self.reference.changes.len() == 1 || !measures.is_exact(criteria)
+            })
             .map(|(_, change)| change.relative)
             .fold(0.0, f64::max);
         Iteration::of(at, relative, length)
@@ -53,7 +55,7 @@ impl Newton<'_> {
         let bodies = balance.by_body.iter().zip(&balance.away).enumerate();
         bodies
             .map(|(body, (&residual, &is_away))| {
-                let change = self.changes.get(body).copied();
+                let change = self.reference.changes.get(body).copied();
                 Measures {
                     residual,
                     whole: change.filter(|_| is_whole),
@@ -65,7 +67,11 @@ impl Newton<'_> {
     }
 
     /// Whether an iteration has ended in equilibrium.
-    pub(super) fn is_equilibrium(&self, balance: &Balance, last: &Iteration) -> bool {
+    pub(in crate::equilibrium) fn is_equilibrium(
+        &self,
+        balance: &Balance,
+        last: &Iteration,
+    ) -> bool {
         let bodies = self.in_equilibrium(balance, last);
         bodies.into_iter().all(|is_there| is_there)
     }
@@ -80,17 +86,21 @@ impl Newton<'_> {
     }
 
     /// Open corrections and forces of a state that the residual alone has accepted.
-    pub(super) fn open(&self, balance: &Balance, iterations: &[Iteration]) -> Option<Open> {
+    pub(in crate::equilibrium) fn open(
+        &self,
+        balance: &Balance,
+        iterations: &[Iteration],
+    ) -> Option<Open> {
         if self.settings.convergence != Convergence::Force {
             return None;
         }
-        let bodies = &self.places.bodies;
+        let bodies = &self.equations.places.bodies;
         let body_of = |equation: usize| match bodies.of_equation.get(equation) {
             Some(&body) => body as usize,
             None => 0,
         };
         let mut squares: BTreeMap<(usize, usize), f64> = BTreeMap::new();
-        let by_equation = self.system.free().iter().zip(&balance.residual);
+        let by_equation = self.equations.system.free().iter().zip(&balance.residual);
         for (equation, (&dof, force)) in by_equation.enumerate() {
             *squares.entry((body_of(equation), dof / 2)).or_default() += force * force;
         }
@@ -111,7 +121,7 @@ impl Newton<'_> {
     }
 
     /// Whether a correction of this relative size will probably be the last one.
-    pub(super) fn probably_ends(&self, residual: f64, correction: f64) -> bool {
+    pub(in crate::equilibrium) fn probably_ends(&self, residual: f64, correction: f64) -> bool {
         let expected = residual * self.kept.contraction;
         let tolerance = self.settings.force_tolerance;
         expected <= EXACT * tolerance
@@ -121,7 +131,7 @@ impl Newton<'_> {
     /// Whether a state with a singular tangent is in equilibrium nevertheless, judged with the matrix at the start of
     /// the step. Example: a layer has just lost contact and with it its stiffness, and the residual is round-off. The
     /// trial state stays.
-    pub(super) fn has_settled(
+    pub(in crate::equilibrium) fn has_settled(
         &mut self,
         increment: &[f64],
         balance: &Balance,
@@ -138,9 +148,9 @@ impl Newton<'_> {
         let operator = self.operator();
         let settled = self.evaluate(&still, task, operator).is_ok() && {
             self.factorise_tangents().is_ok() && {
-                self.matrix.hold();
+                self.equations.matrix.hold();
                 self.solve(&balance.residual, None).is_ok_and(|correction| {
-                    self.changes = self.changes(&correction, increment);
+                    self.reference.changes = self.changes(&correction, increment);
                     let bodies = self.measures(balance, true);
                     bodies.iter().all(|body| body.is_equilibrium(criteria))
                 })
@@ -150,7 +160,11 @@ impl Newton<'_> {
     }
 
     /// Both criteria at a state.
-    pub(super) fn unmet(&self, balance: &Balance, correction: Option<f64>) -> Unmet {
+    pub(in crate::equilibrium) fn unmet(
+        &self,
+        balance: &Balance,
+        correction: Option<f64>,
+    ) -> Unmet {
         let residual_tolerance = self.settings.force_tolerance;
         Unmet {
             failed: if balance.relative <= residual_tolerance {

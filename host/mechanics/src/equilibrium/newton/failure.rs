@@ -67,8 +67,6 @@ pub enum Iterations {
     Newton(usize, Option<Motion>),
     /// So many along the path of equilibrium.
     Path(usize),
-    /// So many steps of viscous relaxation.
-    Relaxation(usize),
 }
 
 /// Why a step found no equilibrium.

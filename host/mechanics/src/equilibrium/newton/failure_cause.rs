@@ -11,7 +11,7 @@ use law::Operator;
 
 impl Newton<'_> {
     /// A failure with its full diagnosis.
-    pub(super) fn explained(
+    pub(in crate::equilibrium) fn explained(
         &mut self,
         failure: StepFailure,
         iterations: Vec<Iteration>,
@@ -20,7 +20,7 @@ impl Newton<'_> {
     ) -> StepFailure {
         let failure = StepFailure {
             iterations,
-            runaway: self.runaway,
+            runaway: self.reference.runaway,
             ..failure
         };
         if failure.is_singular() {
@@ -30,7 +30,7 @@ impl Newton<'_> {
                 ..failure
             };
             let singularity = self.singularity(period);
-            self.tangents = Operator::None;
+            self.kept.tangents = Operator::None;
             self.will_compute(Operator::Elastic);
             failure.explained(singularity, lambda)
         } else {
@@ -39,7 +39,7 @@ impl Newton<'_> {
     }
 
     /// The failure of iterations that have reached their limit.
-    pub(super) fn no_equilibrium(
+    pub(in crate::equilibrium) fn no_equilibrium(
         &mut self,
         control: &impl Control,
         state: &State,
@@ -49,9 +49,9 @@ impl Newton<'_> {
     ) -> StepFailure {
         let unmet = self.unmet(&state.balance, correction);
         // What ran away did so in the last iterate, not in the one that is only tried.
-        let runaway = self.runaway;
+        let runaway = self.reference.runaway;
         let (culprit, before) = self.diagnose(control, state, task).unwrap_or_default();
-        self.runaway = runaway;
+        self.reference.runaway = runaway;
         StepFailure {
             culprit,
             mechanism: self.mechanism(&state.balance.residual, &before, task.period.0),
@@ -100,11 +100,11 @@ impl Newton<'_> {
         before: &[(usize, Vec<f64>)],
         time: f64,
     ) -> Option<Mechanism> {
-        let mut by_dof = vec![0.0; self.displacement.len()];
-        for (&dof, force) in self.system.free().iter().zip(residual) {
+        let mut by_dof = vec![0.0; self.room.displacement.len()];
+        for (&dof, force) in self.equations.system.free().iter().zip(residual) {
             by_dof[dof] = *force;
         }
-        let includes = |number| self.system.includes(number);
+        let includes = |number| self.equations.system.includes(number);
         mechanism::find(self.groups, includes, &by_dof, before, time)
     }
 }

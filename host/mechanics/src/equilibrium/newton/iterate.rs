@@ -7,23 +7,27 @@ use super::Newton;
 use super::failure::StepFailure;
 use super::line_search::LineSearch;
 use super::outcome::Iteration;
-use super::residual::Balance;
+use super::residual::{Balance, Task};
 use law::Operator;
 
 /// An iterate.
 #[derive(Debug)]
-pub(super) struct State {
+pub(in crate::equilibrium) struct State {
     /// Displacement increments, by place.
-    pub(super) increment: Vec<f64>,
+    pub(in crate::equilibrium) increment: Vec<f64>,
     /// Increment of the load factor.
-    pub(super) rise: f64,
+    pub(in crate::equilibrium) rise: f64,
     /// What that leaves out of balance.
-    pub(super) balance: Balance,
+    pub(in crate::equilibrium) balance: Balance,
 }
 
 impl State {
     /// Displacement increments and load factor after this fraction of a correction.
-    pub(super) fn moved_by(&self, length: f64, correction: &Correction) -> (Vec<f64>, f64) {
+    pub(in crate::equilibrium) fn moved_by(
+        &self,
+        length: f64,
+        correction: &Correction,
+    ) -> (Vec<f64>, f64) {
         let pairs = self.increment.iter().zip(&correction.increment);
         (
             pairs.map(|(u, d)| u + length * d).collect(),
@@ -34,26 +38,26 @@ impl State {
 
 /// The correction of an iterate.
 #[derive(Debug)]
-pub(super) struct Correction {
+pub(in crate::equilibrium) struct Correction {
     /// To the displacement increments, by place.
-    pub(super) increment: Vec<f64>,
+    pub(in crate::equilibrium) increment: Vec<f64>,
     /// To the load factor.
-    pub(super) rise: f64,
+    pub(in crate::equilibrium) rise: f64,
 }
 
 /// An iterate that is accepted.
 #[derive(Debug)]
-pub(super) struct Equilibrium {
-    pub(super) state: State,
+pub(in crate::equilibrium) struct Equilibrium {
+    pub(in crate::equilibrium) state: State,
     /// The relative residual if it had to be taken for round-off; else 0.
-    pub(super) round_off: f64,
+    pub(in crate::equilibrium) round_off: f64,
     /// The relative residual if it is tolerated above the tolerance; else 0.
-    pub(super) tolerated: f64,
+    pub(in crate::equilibrium) tolerated: f64,
 }
 
 impl Equilibrium {
     /// One that meets the tolerances, or round-off.
-    pub(super) fn at(state: State, round_off: f64) -> Self {
+    pub(in crate::equilibrium) fn at(state: State, round_off: f64) -> Self {
         let tolerated = 0.0;
         Self {
             state,
@@ -64,7 +68,7 @@ impl Equilibrium {
 }
 
 /// What a step holds fixed, and what follows for its iterations.
-pub(super) trait Control {
+pub(in crate::equilibrium) trait Control {
     /// The first iterate.
     fn predict(&mut self, newton: &mut Newton<'_>) -> Result<State, StepFailure>;
 
@@ -135,7 +139,7 @@ impl Newton<'_> {
     ///
     /// # Errors
     /// No equilibrium within the allowed iterations, or a law or the equations failed.
-    pub(super) fn iterate(
+    pub(in crate::equilibrium) fn iterate(
         &mut self,
         control: &mut impl Control,
         iterations: &mut Vec<Iteration>,
@@ -167,6 +171,37 @@ impl Newton<'_> {
         }
     }
 
+    /// The iterate at these displacement increments and this increment of the load factor.
+    ///
+    /// # Errors
+    /// A law fails.
+    pub(in crate::equilibrium) fn state_at(
+        &mut self,
+        increment: Vec<f64>,
+        rise: f64,
+        (task, operator): (&Task, Operator),
+    ) -> Result<State, StepFailure> {
+        let balance = self.evaluate(&increment, task, operator)?;
+        Ok(State {
+            increment,
+            rise,
+            balance,
+        })
+    }
+
+    /// Displacement increments with those of prescribed and tied degrees of freedom.
+    pub(in crate::equilibrium) fn completed(
+        &self,
+        mut increment: Vec<f64>,
+        prescribed: &[f64],
+    ) -> Vec<f64> {
+        for &place in &self.equations.places.prescribed {
+            increment[place] = prescribed[place];
+        }
+        self.equations.places.follow(&mut increment);
+        increment
+    }
+
     /// The outcome of iterations that end at this state: a tolerated state or a failure.
     fn end_of(
         &mut self,
@@ -186,7 +221,7 @@ impl Newton<'_> {
 
     /// Whether no more iterations are allowed. The state before the first correction is one of the
     /// series.
-    pub(super) fn is_over(&self, series: &[Iteration]) -> bool {
+    pub(in crate::equilibrium) fn is_over(&self, series: &[Iteration]) -> bool {
         series.len() > self.settings.max_iterations()
     }
 }

@@ -6,21 +6,22 @@
 use super::Newton;
 use super::failure::{Reason, StepFailure};
 use super::iterate::{Control, Correction, State};
+use super::outcome::Iteration;
 use law::Operator;
 
 /// The fractions tried, and the choice if all make the residual grow.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LineSearch {
+pub(in crate::equilibrium) struct LineSearch {
     /// Fractions of the correction, the longest first.
-    pub(super) lengths: &'static [f64],
+    pub(in crate::equilibrium) lengths: &'static [f64],
     /// A relative residual that does not count as grown.
-    pub(super) enough: f64,
-    pub(super) otherwise: Otherwise,
+    pub(in crate::equilibrium) enough: f64,
+    pub(in crate::equilibrium) otherwise: Otherwise,
 }
 
 /// The choice if the residual grows at every length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Otherwise {
+pub(in crate::equilibrium) enum Otherwise {
     /// The fraction with the smallest residual. Fails only if a law does at every one.
     Best,
     /// The shortest fraction.
@@ -83,15 +84,15 @@ impl LineSearch {
 }
 
 impl Newton<'_> {
-    /// Follows a correction from an iterate: the fraction taken, and the iterate there. If the step
+    /// Follows a correction from an iterate: the fraction taken, for the log, and the iterate there. If the step
     /// probably `ends` with it, tangents are left out.
-    pub(super) fn search(
+    pub(in crate::equilibrium) fn search(
         &mut self,
         control: &impl Control,
         from: &State,
         correction: &Correction,
         ends: bool,
-    ) -> Result<(f64, State), StepFailure> {
+    ) -> Result<(Iteration, State), StepFailure> {
         let mut search = control.line_search(self, from);
         if !self.settings.line_search {
             search.lengths = &search.lengths[..1];
@@ -105,14 +106,14 @@ impl Newton<'_> {
             self.may_go_on()?;
             control.evaluate(self, from.moved_by(length, correction), operator)
         })?;
-        if found.is_held {
-            return Ok((found.length, found.state));
+        let mut state = found.state;
+        if !found.is_held {
+            // The groups hold the state of the last fraction tried. Another correction follows.
+            let operator = self.operator();
+            state = control.evaluate(self, (state.increment, state.rise), operator)?;
         }
-        // The groups hold the state of the last fraction tried. Another correction follows.
-        let at = (found.state.increment, found.state.rise);
-        let operator = self.operator();
-        let state = control.evaluate(self, at, operator)?;
-        Ok((found.length, state))
+        let taken = self.took(&state, &correction.increment, found.length);
+        Ok((taken, state))
     }
 }
 

@@ -75,7 +75,7 @@ impl Loads {
     }
 
     /// Change of the external forces with λ, by degree of freedom.
-    pub(super) fn external_rate(&self) -> Vec<f64> {
+    pub(in crate::equilibrium) fn external_rate(&self) -> Vec<f64> {
         let ends = self.force_start.iter().zip(&self.force_end);
         ends.zip(&self.out_of_balance)
             .map(|((start, end), rest)| (end - start) / self.length() - rest)
@@ -92,7 +92,7 @@ impl Loads {
     }
 
     /// Increments of prescribed displacements between two load factors, by degree of freedom.
-    pub(super) fn prescribed_increments(&self, from: f64, to: f64) -> Vec<f64> {
+    pub(in crate::equilibrium) fn prescribed_increments(&self, from: f64, to: f64) -> Vec<f64> {
         let mut increments = vec![0.0; self.force_start.len()];
         for &(dof, start, end) in &self.prescribed {
             increments[dof] = self.value(start, end, to) - self.value(start, end, from);

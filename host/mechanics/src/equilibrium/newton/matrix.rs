@@ -36,7 +36,7 @@ enum Sum {
 #[derive(Debug, Default)]
 pub struct Matrix {
     /// There is one to compute corrections with.
-    pub(super) held: bool,
+    pub(in crate::equilibrium) held: bool,
     /// The groups still keep the tangents it was assembled from.
     pub(super) has_tangents: bool,
     /// There is only one: all groups are linear.
@@ -110,35 +110,36 @@ impl Matrix {
 impl Newton<'_> {
     /// Notes that laws are about to compute this operator.
     pub(super) fn will_compute(&mut self, operator: Operator) {
-        self.tangents = Operator::None;
-        if operator != Operator::None && !self.matrix.is_constant {
-            self.matrix.has_tangents = false;
+        self.kept.tangents = Operator::None;
+        if operator != Operator::None && !self.equations.matrix.is_constant {
+            self.equations.matrix.has_tangents = false;
         }
     }
 
     /// The matrix from the tangents that the groups hold, without the domain.
-    pub(super) fn stiffness(&mut self) -> &[f64] {
+    pub(in crate::equilibrium) fn stiffness(&mut self) -> &[f64] {
         let start = Instant::now();
-        let matrix = &mut *self.matrix;
-        self.system
+        let matrix = &mut *self.equations.matrix;
+        self.equations
+            .system
             .assemble_after(&mut matrix.elements, self.groups);
         matrix.sum = match matrix.sum {
             Sum::Last => Sum::Next,
             _ => Sum::Another,
         };
         let columns = matrix.elements.largest();
-        let of_domain = self.domain.map_or(0.0, |domain| domain.largest);
+        let of_domain = self.equations.domain.map_or(0.0, |domain| domain.largest);
         matrix.largest = of_domain.max(largest(columns));
-        let bodies = &self.places.bodies;
+        let bodies = &self.equations.places.bodies;
         if !bodies.of_equation.is_empty() {
             let mut by_body = vec![0.0_f64; bodies.n];
             for (&of_column, &body) in columns.iter().zip(&bodies.of_equation) {
                 by_body[body as usize] = by_body[body as usize].max(of_column);
             }
-            if let Some(domain) = self.domain {
-                let n = self.places.boundary.len();
+            if let Some(domain) = self.equations.domain {
+                let n = self.equations.places.boundary.len();
                 let columns = domain.stiffness().chunks_exact(n.max(1));
-                for (&place, column) in self.places.boundary.iter().zip(columns) {
+                for (&place, column) in self.equations.places.boundary.iter().zip(columns) {
                     let body = bodies.of_place[place] as usize;
                     by_body[body] = by_body[body].max(largest(column));
                 }
@@ -156,21 +157,22 @@ impl Newton<'_> {
     pub(super) fn factorise_tangents(&mut self) -> Result<(), StepFailure> {
         self.stiffness();
         let start = Instant::now();
-        let elements = &mut self.matrix.elements;
-        let outcome = if self.matrix.is_constant {
+        let elements = &mut self.equations.matrix.elements;
+        let outcome = if self.equations.matrix.is_constant {
             // It is not added up again.
-            self.solver.factorise(elements.take())
-        } else if self.matrix.sum == Sum::Next {
-            self.solver
+            self.equations.solver.factorise(elements.take())
+        } else if self.equations.matrix.sum == Sum::Next {
+            self.equations
+                .solver
                 .factorise_changed(elements.values(), elements.changed())
         } else {
-            let mut values = self.solver.room();
+            let mut values = self.equations.solver.room();
             values.clear();
             values.extend_from_slice(elements.values());
-            self.solver.factorise(values)
+            self.equations.solver.factorise(values)
         };
         self.factorised(start, outcome)?;
-        self.matrix.sum = Sum::Last;
+        self.equations.matrix.sum = Sum::Last;
         Ok(())
     }
 
@@ -178,9 +180,12 @@ impl Newton<'_> {
     ///
     /// # Errors
     /// It is singular.
-    pub(super) fn factorise(&mut self, values: Vec<f64>) -> Result<(), StepFailure> {
+    pub(in crate::equilibrium) fn factorise(
+        &mut self,
+        values: Vec<f64>,
+    ) -> Result<(), StepFailure> {
         let start = Instant::now();
-        let outcome = self.solver.factorise(values);
+        let outcome = self.equations.solver.factorise(values);
         self.factorised(start, outcome)
     }
 
@@ -189,19 +194,21 @@ impl Newton<'_> {
         start: Instant,
         outcome: Result<(), Singular>,
     ) -> Result<(), StepFailure> {
-        self.matrix.held = false;
-        self.matrix.sum = Sum::Another;
+        self.equations.matrix.held = false;
+        self.equations.matrix.sum = Sum::Another;
         self.costs.equations += start.elapsed();
         self.costs.factorisations += 1;
         outcome.map_err(|_| Reason::Singular(None).into())
     }
 
     /// K_fp Δp with the tangents that the groups hold, by equation.
-    pub(super) fn coupling(&mut self, prescribed: &[f64]) -> Vec<f64> {
+    pub(in crate::equilibrium) fn coupling(&mut self, prescribed: &[f64]) -> Vec<f64> {
         let start = Instant::now();
-        let mut coupling = vec![0.0; self.places.free.len()];
-        self.places.scatter(prescribed, &mut self.displacement);
-        let (system, increment) = (self.system, &self.displacement);
+        let mut coupling = vec![0.0; self.equations.places.free.len()];
+        self.equations
+            .places
+            .scatter(prescribed, &mut self.room.displacement);
+        let (system, increment) = (self.equations.system, &self.room.displacement);
         system.prescribed_forces(self.groups, increment, &mut coupling);
         self.costs.assembly += start.elapsed();
         coupling
@@ -214,8 +221,11 @@ impl Newton<'_> {
     ///
     /// # Errors
     /// The matrix is singular.
-    pub(super) fn correction_of(&mut self, balance: &Balance) -> Result<Vec<f64>, StepFailure> {
-        let of_equation = &self.places.bodies.of_equation;
+    pub(in crate::equilibrium) fn correction_of(
+        &mut self,
+        balance: &Balance,
+    ) -> Result<Vec<f64>, StepFailure> {
+        let of_equation = &self.equations.places.bodies.of_equation;
         let share = noise(balance.residual.len(), self.settings.force_tolerance);
         let left: Vec<f64> = balance.scales.iter().map(|scale| share * scale).collect();
         let entries = balance.residual.iter().enumerate();
@@ -233,7 +243,7 @@ impl Newton<'_> {
     ///
     /// # Errors
     /// The matrix is singular.
-    pub(super) fn solve(
+    pub(in crate::equilibrium) fn solve(
         &mut self,
         residual: &[f64],
         prescribed: Option<&[f64]>,
@@ -244,14 +254,30 @@ impl Newton<'_> {
         };
         let start = Instant::now();
         let right: Vec<f64> = residual.iter().zip(&coupling).map(|(r, c)| r - c).collect();
-        let solution = self.solver.solve(&right);
+        let solution = self.equations.solver.solve(&right);
         self.costs.equations += start.elapsed();
         let solution = solution.map_err(|_| StepFailure::from(Reason::Singular(None)))?;
-        let mut correction = vec![0.0; self.places.n()];
-        for (&place, value) in self.places.free.iter().zip(solution) {
+        let mut correction = vec![0.0; self.equations.places.n()];
+        for (&place, value) in self.equations.places.free.iter().zip(solution) {
             correction[place] = value;
         }
-        self.places.follow(&mut correction);
+        self.equations.places.follow(&mut correction);
         Ok(correction)
+    }
+    /// Displacement increments that answer a residual with the matrix there is, these prescribed ones included.
+    ///
+    /// # Errors
+    /// The matrix is singular.
+    pub(in crate::equilibrium) fn answer_to(
+        &mut self,
+        residual: &[f64],
+        prescribed: &[f64],
+    ) -> Result<Vec<f64>, StepFailure> {
+        let mut increment = self.solve(residual, Some(prescribed))?;
+        for (value, prescribed) in increment.iter_mut().zip(prescribed) {
+            *value += prescribed;
+        }
+        self.equations.places.follow(&mut increment);
+        Ok(increment)
     }
 }

@@ -33,15 +33,17 @@ const LAST: usize = 3;
 
 /// Data of a step that decide whether the matrix is kept.
 #[derive(Debug)]
-pub(super) struct Kept {
+pub(in crate::equilibrium) struct Kept {
     /// How often the matrix has been renewed in this step.
     renewed: usize,
     /// Corrections may be slow until it is renewed for the second time.
     may_be_slow: bool,
+    /// What the last evaluation asked the laws for.
+    pub(super) tangents: Operator,
     /// It makes too little progress.
-    pub(super) stalls: bool,
+    pub(in crate::equilibrium) stalls: bool,
     /// Fraction of the residual that the next correction will probably leave.
-    pub(super) contraction: f64,
+    pub(in crate::equilibrium) contraction: f64,
 }
 
 impl Default for Kept {
@@ -50,6 +52,7 @@ impl Default for Kept {
         Self {
             renewed: 0,
             may_be_slow: false,
+            tangents: Operator::None,
             stalls: false,
             contraction: f64::INFINITY,
         }
@@ -61,48 +64,55 @@ impl Newton<'_> {
     pub(super) fn begin(&mut self) {
         self.kept.renewed = 0;
         self.kept.may_be_slow = false;
-        self.matrix.held &= self.matrix.has_tangents;
-        self.solver.check_next();
+        self.equations.matrix.held &= self.equations.matrix.has_tangents;
+        self.equations.solver.check_next();
     }
 
     /// Ends a step. What a failed one leaves behind belongs to no state; and a matrix that was
     /// factorised another way would not be so again.
-    pub(super) fn end(&mut self, is_equilibrium: bool) {
-        if !self.matrix.is_constant {
+    pub(in crate::equilibrium) fn end(&mut self, is_equilibrium: bool) {
+        if !self.equations.matrix.is_constant {
             let may_stay = is_equilibrium || self.settings.method != Method::Auto;
-            self.matrix.has_tangents &= may_stay && !self.solver.has_fallen_back();
+            self.equations.matrix.has_tangents &=
+                may_stay && !self.equations.solver.has_fallen_back();
         }
     }
 
     /// Whether the matrix is that of an earlier step, though another could be had.
     pub(super) fn is_stale(&self) -> bool {
-        self.settings.method == Method::Auto && !self.matrix.is_constant && self.kept.renewed == 0
+        self.settings.method == Method::Auto
+            && !self.equations.matrix.is_constant
+            && self.kept.renewed == 0
     }
 
     /// Begins the step with slow corrections where they are cheaper than another matrix.
-    pub(super) fn begin_slowly(&mut self) {
+    pub(in crate::equilibrium) fn begin_slowly(&mut self) {
         let groups = self.groups.iter().enumerate();
-        let called = groups.filter(|(number, _)| self.system.includes(*number));
+        let called = groups.filter(|(number, _)| self.equations.system.includes(*number));
         let n_points: usize = called.map(|(_, group)| group.kinematics.n_points()).sum();
-        let n = self.places.boundary.len() as f64;
-        let is_dear = self.domain.is_some() && n * n * n > DEAR * n_points as f64;
+        let n = self.equations.places.boundary.len() as f64;
+        let is_dear = self.equations.domain.is_some() && n * n * n > DEAR * n_points as f64;
         let is_auto = self.settings.method == Method::Auto;
-        self.kept.may_be_slow = is_dear && is_auto && !self.matrix.is_constant;
+        self.kept.may_be_slow = is_dear && is_auto && !self.equations.matrix.is_constant;
     }
 
     /// Whether corrections with the present matrix may be slow.
-    pub(super) fn is_slow(&self) -> bool {
+    pub(in crate::equilibrium) fn is_slow(&self) -> bool {
         self.kept.may_be_slow && self.kept.renewed <= 1
     }
 
     /// Whether corrections come from a matrix that is kept though another could be had.
-    pub(super) fn keeps(&self) -> bool {
+    pub(in crate::equilibrium) fn keeps(&self) -> bool {
         self.is_stale() || self.is_slow()
     }
 
     /// Whether slow corrections have to end. Either the last ones `since` the present matrix predict more of them than
     /// a new matrix is worth, or the step has used more than half of its iterations.
-    pub(super) fn is_too_slow(&self, iterations: &[Iteration], since: usize) -> bool {
+    pub(in crate::equilibrium) fn is_too_slow(
+        &self,
+        iterations: &[Iteration],
+        since: usize,
+    ) -> bool {
         let is_half = 2 * iterations.len() > self.settings.max_iterations();
         let Some([before, .., last]) = iterations[since..].last_chunk::<{ LAST + 1 }>() else {
             return is_half;
@@ -114,12 +124,12 @@ impl Newton<'_> {
 
     /// Whether the next correction needs another matrix.
     fn renews(&self) -> bool {
-        !self.matrix.held
-            || !self.matrix.is_constant
+        !self.equations.matrix.held
+            || !self.equations.matrix.is_constant
                 && match self.settings.method {
                     Method::Auto if self.is_slow() => self.kept.stalls,
                     Method::Auto => {
-                        self.kept.contraction > FAST[usize::from(self.domain.is_none())]
+                        self.kept.contraction > FAST[usize::from(self.equations.domain.is_none())]
                     }
                     Method::Newton => true,
                     Method::ModifiedNewton => self.kept.renewed == 0,
@@ -129,7 +139,7 @@ impl Newton<'_> {
     }
 
     /// The request to laws in an evaluation that a correction follows.
-    pub(super) fn operator(&self) -> Operator {
+    pub(in crate::equilibrium) fn operator(&self) -> Operator {
         match self.settings.method {
             _ if !self.renews() => Operator::None,
             Method::InitialStress => Operator::Elastic,
@@ -143,17 +153,21 @@ impl Newton<'_> {
     ///
     /// # Errors
     /// A law fails, or the matrix is singular.
-    pub(super) fn prepare(&mut self, increment: &[f64], task: &Task) -> Result<bool, StepFailure> {
+    pub(in crate::equilibrium) fn prepare(
+        &mut self,
+        increment: &[f64],
+        task: &Task,
+    ) -> Result<bool, StepFailure> {
         if !self.renews() {
             return Ok(false);
         }
         let operator = self.operator();
-        if self.tangents != operator {
+        if self.kept.tangents != operator {
             self.evaluate(increment, task, operator)
                 .map_err(StepFailure::from)?;
         }
         self.factorise_tangents()?;
-        self.matrix.hold();
+        self.equations.matrix.hold();
         self.kept.renewed += 1;
         self.kept.stalls = false;
         Ok(true)
@@ -161,7 +175,7 @@ impl Newton<'_> {
 
     /// Takes up what the last correction achieved, and renews the matrix where the method wants it.
     /// Says whether there is another one now.
-    pub(super) fn renew(
+    pub(in crate::equilibrium) fn renew(
         &mut self,
         iterations: &[Iteration],
         increment: &[f64],
@@ -179,7 +193,7 @@ impl Newton<'_> {
 
     /// One whole correction with the matrix of an earlier step. `None` if the matrix is not one, or
     /// if the residual grows: then the matrix of this state has taken its place.
-    pub(super) fn correct_with_kept(
+    pub(in crate::equilibrium) fn correct_with_kept(
         &mut self,
         control: &impl Control,
         state: &State,
@@ -202,7 +216,7 @@ impl Newton<'_> {
             return Ok(Some((taken, next)));
         }
         // The groups hold another state.
-        self.tangents = Operator::None;
+        self.kept.tangents = Operator::None;
         self.kept.contraction = f64::INFINITY;
         self.prepare(&state.increment, task)?;
         Ok(None)

@@ -17,9 +17,15 @@ use law::Operator;
 /// Most bytes of a factorisation that is kept besides that of the iterations.
 const MOST_BESIDE: u64 = 1 << 28;
 
-/// Its value in the present step; by body.
+/// References of the present step, and how its last iterate compares with them; by body.
 #[derive(Debug, Default)]
-pub(super) struct Given {
+pub(in crate::equilibrium) struct Reference {
+    /// Largest of the forces at the start of the phase.
+    pub(super) at_start: Vec<f64>,
+    /// Sizes of the last correction.
+    pub(super) changes: Vec<Change>,
+    /// What ran away in the last evaluation.
+    pub(super) runaway: Option<Runaway>,
     /// Sizes of the displacement increments that the iterations start from; empty before.
     predicted: Vec<f64>,
     /// They come from the tangent at the start, which may have next to no stiffness.
@@ -40,7 +46,15 @@ struct Elastic {
     moves: Vec<f64>,
 }
 
-impl Given {
+impl Reference {
+    /// Nothing but the loads at the start of a step.
+    pub(super) fn at_start(at_start: Vec<f64>) -> Self {
+        Self {
+            at_start,
+            ..Self::default()
+        }
+    }
+
     /// Size of the displacement increments of a body that can be expected; 0: not known.
     fn expected(&self, body: usize) -> f64 {
         let predicted = self.predicted.get(body).copied().unwrap_or(0.0);
@@ -55,7 +69,7 @@ impl Given {
 impl Newton<'_> {
     /// 2-norms by body of a vector by place.
     pub(super) fn by_body(&self, by_place: &[f64]) -> Vec<f64> {
-        let bodies = &self.places.bodies;
+        let bodies = &self.equations.places.bodies;
         norms(&bodies.of_place, bodies.n, by_place)
     }
 
@@ -67,42 +81,48 @@ impl Newton<'_> {
         stress: &dyn Fn(&Group, usize) -> Vec<f64>,
     ) -> Vec<f64> {
         let mut sizes = self.by_body(internal);
-        if self.places.bodies.shared.is_empty() {
+        if self.equations.places.bodies.shared.is_empty() {
             return sizes;
         }
         for (body, size) in sizes.iter_mut().enumerate() {
             for (number, group) in self.groups.iter().enumerate() {
-                if !self.system.includes(number) {
+                if !self.equations.system.includes(number) {
                     continue;
                 }
                 let n = group.kinematics.n_components();
                 let mut own = stress(group, number);
-                let of_element = &self.places.bodies.of_element[number];
+                let of_element = &self.equations.places.bodies.of_element[number];
                 for (element, &of) in of_element.iter().enumerate() {
                     if of as usize != body {
                         let points = group.kinematics.points_of(element);
                         own[points.start * n..points.end * n].fill(0.0);
                     }
                 }
-                group.kinematics.add_forces(&own, &mut self.force);
+                group.kinematics.add_forces(&own, &mut self.room.force);
             }
-            let mut forces = self.places.take(&mut self.force);
-            self.places.fold(&mut forces);
-            let shared = self.places.bodies.shared.iter().map(|&place| forces[place]);
+            let mut forces = self.equations.places.take(&mut self.room.force);
+            self.equations.places.fold(&mut forces);
+            let shared = self
+                .equations
+                .places
+                .bodies
+                .shared
+                .iter()
+                .map(|&place| forces[place]);
             *size = shared.fold(*size, f64::hypot);
         }
         sizes
     }
 
     /// Takes note of where the iterations start.
-    pub(super) fn starts_from(&mut self, increment: &[f64], from_tangent: bool) {
-        self.given.predicted = self.by_body(increment);
-        self.given.from_tangent = from_tangent;
+    pub(in crate::equilibrium) fn starts_from(&mut self, increment: &[f64], from_tangent: bool) {
+        self.reference.predicted = self.by_body(increment);
+        self.reference.from_tangent = from_tangent;
     }
 
     /// Largest displacement increment of every body, and where it is.
     fn largest_moves(&self, increment: &[f64]) -> Vec<(f64, usize)> {
-        let bodies = &self.places.bodies;
+        let bodies = &self.equations.places.bodies;
         let mut largest = vec![(0.0, 0); bodies.n];
         for (place, value) in increment.iter().enumerate() {
             let body = bodies.of_place.get(place).map_or(0, |&body| body as usize);
@@ -118,35 +138,36 @@ impl Newton<'_> {
     /// For every body, whether it has moved by more than its own size and far beyond what can be
     /// expected.
     pub(super) fn away(&mut self, increment: &[f64], task: &Task) -> Vec<bool> {
-        self.runaway = None;
-        let n = self.places.bodies.n;
+        self.reference.runaway = None;
+        let n = self.equations.places.bodies.n;
         // What is linear cannot run away.
-        if self.given.predicted.is_empty() || self.matrix.is_constant {
+        if self.reference.predicted.is_empty() || self.equations.matrix.is_constant {
             return vec![false; n];
         }
         let sizes = self.by_body(increment);
         let largest = self.largest_moves(increment);
-        let extents = &self.places.bodies.extents;
+        let extents = &self.equations.places.bodies.extents;
         let leaves =
             |body: usize| largest[body].0 > extents.get(body).copied().unwrap_or(f64::INFINITY);
-        let exceeds = |given: &Given, body: usize| {
+        let exceeds = |given: &Reference, body: usize| {
             let expected = given.expected(body);
             expected > 0.0 && sizes[body] > MOVES * expected
         };
-        let is_odd = |body| exceeds(&self.given, body) || (self.given.from_tangent && leaves(body));
-        if self.given.elastic.is_none() && (0..n).any(is_odd) {
-            self.given.elastic = Some(self.elastic_answer(task));
+        let is_odd =
+            |body| exceeds(&self.reference, body) || (self.reference.from_tangent && leaves(body));
+        if self.reference.elastic.is_none() && (0..n).any(is_odd) {
+            self.reference.elastic = Some(self.elastic_answer(task));
         }
         let away: Vec<bool> = (0..n)
-            .map(|body| leaves(body) && exceeds(&self.given, body))
+            .map(|body| leaves(body) && exceeds(&self.reference, body))
             .collect();
         let farthest = (0..n)
             .filter(|&body| away[body])
             .max_by(|&a, &b| largest[a].0.total_cmp(&largest[b].0));
-        self.runaway = farthest.map(|body| {
+        self.reference.runaway = farthest.map(|body| {
             let place = largest[body].1;
             Runaway {
-                dof: self.places.dof(place),
+                dof: self.equations.places.dof(place),
                 increment: increment[place],
             }
         });
@@ -158,7 +179,7 @@ impl Newton<'_> {
         let sizes = self.by_body(correction);
         let moved = self.by_body(moved);
         let both = sizes.iter().zip(moved).enumerate();
-        both.map(|(body, (&size, moved))| Change::of(size, moved, self.given.expected(body)))
+        both.map(|(body, (&size, moved))| Change::of(size, moved, self.reference.expected(body)))
             .collect()
     }
 
@@ -182,7 +203,7 @@ impl Newton<'_> {
             .collect();
         let is_capped = |forces: &[Forces]| forces.iter().any(|f| f.scale() < f.in_play);
         let mut has_moved = false;
-        if self.matrix.is_constant {
+        if self.equations.matrix.is_constant {
             for (forces, in_play) in forces.iter_mut().zip(in_play) {
                 forces.last = *in_play;
             }
@@ -194,11 +215,11 @@ impl Newton<'_> {
             }
         }
         if is_capped(&forces) {
-            if self.given.elastic.is_none() {
-                self.given.elastic = Some(self.elastic_answer(task));
+            if self.reference.elastic.is_none() {
+                self.reference.elastic = Some(self.elastic_answer(task));
                 has_moved = true;
             }
-            let elastic = self.given.elastic.as_ref().and_then(Option::as_ref);
+            let elastic = self.reference.elastic.as_ref().and_then(Option::as_ref);
             for (body, forces) in forces.iter_mut().enumerate() {
                 forces.elastic = elastic.map(|elastic| elastic.forces[body]);
             }
@@ -211,21 +232,21 @@ impl Newton<'_> {
 
     /// Internal forces of the last equilibrium, by body.
     fn last_forces(&mut self) -> Vec<f64> {
-        if let Some(last) = &self.given.last {
+        if let Some(last) = &self.reference.last {
             return last.clone();
         }
         for (number, group) in self.groups.iter().enumerate() {
-            if self.system.includes(number) {
+            if self.equations.system.includes(number) {
                 group
                     .kinematics
-                    .add_forces(&group.carried(), &mut self.force);
+                    .add_forces(&group.carried(), &mut self.room.force);
             }
         }
-        let mut internal = self.places.take(&mut self.force);
-        self.places.fold(&mut internal);
+        let mut internal = self.equations.places.take(&mut self.room.force);
+        self.equations.places.fold(&mut internal);
         let committed = |group: &Group, _: usize| group.carried().into_owned();
         let last = self.forces_by_body(&internal, &committed);
-        self.given.last = Some(last.clone());
+        self.reference.last = Some(last.clone());
         last
     }
 
@@ -248,38 +269,50 @@ impl Newton<'_> {
 
     fn answer(&mut self, operator: Operator, task: &Task) -> Option<Elastic> {
         let (solver, mut internal) = self.factorise_at_start(operator, task.period).ok()?;
-        if self.domain.is_some() {
-            for (&place, force) in self.places.boundary.iter().zip(&self.domain_forces) {
+        if self.equations.domain.is_some() {
+            for (&place, force) in self
+                .equations
+                .places
+                .boundary
+                .iter()
+                .zip(&self.start.domain_forces)
+            {
                 internal[place] += force;
             }
         }
-        let mut coupling = vec![0.0; self.places.free.len()];
-        self.places
-            .scatter(&task.prescribed, &mut self.displacement);
-        self.system
-            .prescribed_forces(self.groups, &self.displacement, &mut coupling);
-        let free = self.places.free.iter().zip(&coupling);
+        let mut coupling = vec![0.0; self.equations.places.free.len()];
+        self.equations
+            .places
+            .scatter(&task.prescribed, &mut self.room.displacement);
+        self.equations.system.prescribed_forces(
+            self.groups,
+            &self.room.displacement,
+            &mut coupling,
+        );
+        let free = self.equations.places.free.iter().zip(&coupling);
         let right: Vec<f64> = free
             .map(|(&place, coupling)| task.external[place] - internal[place] - coupling)
             .collect();
         let solution = self.solve_at_start(solver, &right).ok()?;
         let mut increment = task.prescribed.clone();
-        for (&place, value) in self.places.free.iter().zip(solution) {
+        for (&place, value) in self.equations.places.free.iter().zip(solution) {
             increment[place] = value;
         }
-        self.places.follow(&mut increment);
-        self.places.scatter(&increment, &mut self.displacement);
+        self.equations.places.follow(&mut increment);
+        self.equations
+            .places
+            .scatter(&increment, &mut self.room.displacement);
         let groups = self.groups.iter();
         let stresses: Vec<Vec<f64>> = groups
-            .map(|group| group.linear_change(&self.displacement))
+            .map(|group| group.linear_change(&self.room.displacement))
             .collect();
         for (number, (group, stress)) in self.groups.iter().zip(&stresses).enumerate() {
-            if self.system.includes(number) {
-                group.kinematics.add_forces(stress, &mut self.force);
+            if self.equations.system.includes(number) {
+                group.kinematics.add_forces(stress, &mut self.room.force);
             }
         }
-        let mut forces = self.places.take(&mut self.force);
-        self.places.fold(&mut forces);
+        let mut forces = self.equations.places.take(&mut self.room.force);
+        self.equations.places.fold(&mut forces);
         Some(Elastic {
             forces: self.forces_by_body(&forces, &|_, number| stresses[number].clone()),
             moves: self.by_body(&increment),
@@ -293,23 +326,31 @@ impl Newton<'_> {
         operator: Operator,
         period: (f64, f64),
     ) -> Result<(Option<LinearSolver>, Vec<f64>), Singularity> {
-        self.displacement.fill(0.0);
+        self.room.displacement.fill(0.0);
         let outcome = self.evaluate_groups(period, operator);
-        let mut internal = self.places.take(&mut self.force);
+        let mut internal = self.equations.places.take(&mut self.room.force);
         outcome.map_err(|_| Singularity::Unknown)?;
-        self.places.fold(&mut internal);
-        if self.matrix.is_of_tangents(self.system, self.groups) {
+        self.equations.places.fold(&mut internal);
+        if self
+            .equations
+            .matrix
+            .is_of_tangents(self.equations.system, self.groups)
+        {
             return Ok((None, internal));
         }
-        let mut solver = if let Some(solver) = self.matrix.beside.take() {
+        let mut solver = if let Some(solver) = self.equations.matrix.beside.take() {
             solver
         } else {
-            let solver = self.solver.another().map_err(|_| Singularity::Free)?;
-            self.matrix.announce_beside(solver.bytes());
+            let solver = self
+                .equations
+                .solver
+                .another()
+                .map_err(|_| Singularity::Free)?;
+            self.equations.matrix.announce_beside(solver.bytes());
             solver
         };
         let mut values = solver.room();
-        self.system.assemble(self.groups, &mut values);
+        self.equations.system.assemble(self.groups, &mut values);
         let outcome = solver.factorise(values);
         outcome.map_err(|_| Singularity::Free)?;
         Ok((Some(solver), internal))
@@ -324,11 +365,11 @@ impl Newton<'_> {
         right: &[f64],
     ) -> Result<Vec<f64>, Singular> {
         let Some(mut solver) = beside else {
-            return self.solver.solve(right);
+            return self.equations.solver.solve(right);
         };
         let solution = solver.solve(right);
         if solver.bytes() <= MOST_BESIDE && !solver.has_fallen_back() {
-            self.matrix.beside = Some(solver);
+            self.equations.matrix.beside = Some(solver);
         }
         solution
     }
@@ -339,7 +380,7 @@ impl Newton<'_> {
         match self.factorise_at_start(Operator::Elastic, period) {
             Err(singularity) => singularity,
             Ok((solver, _)) => {
-                let right = vec![1.0; self.places.free.len()];
+                let right = vec![1.0; self.equations.places.free.len()];
                 if self.solve_at_start(solver, &right).is_ok() {
                     Singularity::Limit
                 } else {

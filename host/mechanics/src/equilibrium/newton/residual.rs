@@ -8,43 +8,66 @@ use std::time::Instant;
 
 /// A step's end: what an iterate is held against.
 #[derive(Debug)]
-pub(super) struct Task {
+pub(in crate::equilibrium) struct Task {
     /// External forces, by place.
-    pub(super) external: Vec<f64>,
+    pub(in crate::equilibrium) external: Vec<f64>,
     /// Norm of those on all degrees of freedom, or of the forces at the start of the phase; by body.
     pub(super) imposed: Vec<f64>,
     /// Increments of prescribed displacements, by place.
-    pub(super) prescribed: Vec<f64>,
+    pub(in crate::equilibrium) prescribed: Vec<f64>,
     /// Time at the start, and its increment.
-    pub(super) period: (f64, f64),
+    pub(in crate::equilibrium) period: (f64, f64),
 }
 
 /// Residual by equation, and the residual's norm relative to the forces in play.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Balance {
-    pub(super) residual: Vec<f64>,
+pub(in crate::equilibrium) struct Balance {
+    pub(in crate::equilibrium) residual: Vec<f64>,
     /// The largest of all bodies.
-    pub(super) relative: f64,
+    pub(in crate::equilibrium) relative: f64,
     pub(super) by_body: Vec<f64>,
     /// Its reference, by body.
-    pub(super) scales: Vec<f64>,
+    pub(in crate::equilibrium) scales: Vec<f64>,
     /// For every body, whether it has diverged.
-    pub(super) away: Vec<bool>,
-    pub(super) unreliable: Option<String>,
+    pub(in crate::equilibrium) away: Vec<bool>,
+    pub(in crate::equilibrium) unreliable: Option<String>,
 }
 
 impl Newton<'_> {
+    /// A step's end with these external forces by degree of freedom, increments of prescribed displacements by place,
+    /// and time at its start with its increment.
+    pub(in crate::equilibrium) fn task(
+        &self,
+        external: &[f64],
+        prescribed: Vec<f64>,
+        period: (f64, f64),
+    ) -> Task {
+        Task {
+            external: self.equations.places.gather(external),
+            imposed: self.imposed(external),
+            prescribed,
+            period,
+        }
+    }
+
+    /// Takes up the forces of the domain at a load factor if its boundary stays where it is.
+    pub(in crate::equilibrium) fn take_domain_forces(&mut self, lambda: f64) {
+        if let Some(domain) = self.equations.domain {
+            self.start.domain_forces = domain.forces_at(lambda);
+        }
+    }
+
     /// Norm of external forces, or of the forces at the start of the phase; by body.
-    pub(super) fn imposed(&self, external: &[f64]) -> Vec<f64> {
-        let bodies = &self.places.bodies;
+    fn imposed(&self, external: &[f64]) -> Vec<f64> {
+        let bodies = &self.equations.places.bodies;
         let norms = norms(&bodies.of_dof, bodies.n, external);
-        let both = norms.iter().zip(&self.at_start);
+        let both = norms.iter().zip(&self.reference.at_start);
         both.map(|(norm, at_start)| norm.max(*at_start)).collect()
     }
 
     /// Trial state, internal forces and residual under displacement increments; also the
     /// tangents if an `operator` is wanted.
-    pub(super) fn evaluate(
+    pub(in crate::equilibrium) fn evaluate(
         &mut self,
         increment: &[f64],
         task: &Task,
@@ -62,21 +85,21 @@ impl Newton<'_> {
         if has_moved {
             (internal, unreliable) = self.internal_forces(increment, task, operator)?;
         }
-        self.tangents = operator;
-        if let Some(domain) = self.domain {
-            let boundary = &self.places.boundary;
+        self.kept.tangents = operator;
+        if let Some(domain) = self.equations.domain {
+            let boundary = &self.equations.places.boundary;
             let moved: Vec<f64> = boundary.iter().map(|&place| increment[place]).collect();
-            let mut forces = self.domain_forces.clone();
+            let mut forces = self.start.domain_forces.clone();
             domain.add_product(&moved, &mut forces);
             for (&place, force) in boundary.iter().zip(forces) {
                 internal[place] += force;
             }
         }
-        let free = self.places.free.iter();
+        let free = self.equations.places.free.iter();
         let residual: Vec<f64> = free
             .map(|&place| task.external[place] - internal[place])
             .collect();
-        let bodies = &self.places.bodies;
+        let bodies = &self.equations.places.bodies;
         let sizes = norms(&bodies.of_equation, bodies.n, &residual);
         let both = sizes.iter().zip(&scales);
         let by_body: Vec<f64> = both
@@ -103,52 +126,56 @@ impl Newton<'_> {
     ) -> Result<(Vec<f64>, Option<String>), PointFailure> {
         self.costs.evaluations += 1;
         let mut period = task.period;
-        if let Some((base, left)) = &self.base {
+        if let Some((base, left)) = &self.start.base {
             let since: Vec<f64> = increment.iter().zip(base).map(|(u, u_0)| u - u_0).collect();
-            self.places.scatter(&since, &mut self.displacement);
+            self.equations
+                .places
+                .scatter(&since, &mut self.room.displacement);
             period = *left;
         } else {
-            self.places.scatter(increment, &mut self.displacement);
+            self.equations
+                .places
+                .scatter(increment, &mut self.room.displacement);
         }
         let outcome = self.evaluate_groups(period, operator);
-        let mut internal = self.places.take(&mut self.force);
+        let mut internal = self.equations.places.take(&mut self.room.force);
         let unreliable = outcome?;
-        self.places.fold(&mut internal);
+        self.equations.places.fold(&mut internal);
         Ok((internal, unreliable))
     }
 
     /// Commits the trial state, which belongs to these displacement increments, within the step; when what is left of
     /// it starts, and how long that takes.
-    pub(super) fn commit(&mut self, increment: &[f64], left: (f64, f64)) {
+    pub(in crate::equilibrium) fn commit(&mut self, increment: &[f64], left: (f64, f64)) {
         for (number, group) in self.groups.iter_mut().enumerate() {
-            if self.system.includes(number) {
+            if self.equations.system.includes(number) {
                 group.commit();
             }
         }
-        self.base = Some((increment.to_vec(), left));
+        self.start.base = Some((increment.to_vec(), left));
     }
 
     /// The committed state of the groups.
-    pub(super) fn committed(&self) -> Vec<Committed> {
+    pub(in crate::equilibrium) fn committed(&self) -> Vec<Committed> {
         self.groups.iter().map(Group::committed).collect()
     }
 
     /// Takes back what was committed within the step.
-    pub(super) fn restore(&mut self, committed: Vec<Committed>) {
+    pub(in crate::equilibrium) fn restore(&mut self, committed: Vec<Committed>) {
         for (group, committed) in self.groups.iter_mut().zip(committed) {
             group.restore_committed(committed);
         }
-        self.base = None;
+        self.start.base = None;
     }
 
     /// Forces by body that count as none where no force has ever acted: round-off of K u.
     fn floors(&self, increment: &[f64], task: &Task) -> Vec<f64> {
-        let bodies = &self.places.bodies;
+        let bodies = &self.equations.places.bodies;
         let sizes = self.by_body(increment);
-        let of_domain = super::norm(&self.domain_forces);
+        let of_domain = super::norm(&self.start.domain_forces);
         (0..bodies.n)
             .map(|body| {
-                let cancelling = self.matrix.largest_of(body) * sizes[body] + of_domain;
+                let cancelling = self.equations.matrix.largest_of(body) * sizes[body] + of_domain;
                 // Forces no larger than that are themselves what rounding leaves.
                 if task.imposed[body] > ROUND_OFF * cancelling {
                     0.0
@@ -168,13 +195,14 @@ impl Newton<'_> {
     ) -> Result<Option<String>, PointFailure> {
         let mut unreliable = None;
         for (number, group) in self.groups.iter_mut().enumerate() {
-            if !self.system.includes(number) {
+            if !self.equations.system.includes(number) {
                 continue;
             }
-            let success = group.evaluate(&self.displacement, operator, time, time_increment)?;
+            let success =
+                group.evaluate(&self.room.displacement, operator, time, time_increment)?;
             group
                 .kinematics
-                .add_forces(&group.carried_on_trial(), &mut self.force);
+                .add_forces(&group.carried_on_trial(), &mut self.room.force);
             unreliable = unreliable.or(success
                 .unreliable
                 .map(|(_, why)| format!("group `{}`: {why}", group.name)));

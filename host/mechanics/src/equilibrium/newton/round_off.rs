@@ -10,7 +10,7 @@ use law::Operator;
 pub(crate) const STILL_SMALL: f64 = 1e-6;
 /// Round-off that a state may have, in changes of its forces by the last bit of the displacement
 /// increments.
-pub(in super::super) const ACCEPTED_ROUND_OFF: f64 = 8.0;
+pub(in crate::equilibrium) const ACCEPTED_ROUND_OFF: f64 = 8.0;
 /// Round-off of K u, relative to the forces it is the difference of.
 pub(crate) const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
 
@@ -19,7 +19,7 @@ impl Newton<'_> {
     /// that no iteration can lessen it: in all bodies that are not in equilibrium anyway after the
     /// last iteration. A residual within its tolerance while corrections go on is not round-off.
     /// The trial state stays.
-    pub(super) fn is_round_off(
+    pub(in crate::equilibrium) fn is_round_off(
         &mut self,
         increment: &[f64],
         (balance, last): (&Balance, &Iteration),
@@ -28,9 +28,9 @@ impl Newton<'_> {
         if balance.relative > STILL_SMALL || balance.away.contains(&true) {
             return false;
         }
-        let operator = self.tangents;
+        let operator = self.kept.tangents;
         let mut scattered = last_bit_scattered(increment);
-        self.places.follow(&mut scattered);
+        self.equations.places.follow(&mut scattered);
         let moved = self.evaluate(&scattered, task, Operator::None);
         let again = self.evaluate(increment, task, operator);
         let (Ok(moved), Ok(_)) = (moved, again) else {
@@ -39,7 +39,7 @@ impl Newton<'_> {
         let pairs = moved.residual.iter().zip(&balance.residual);
         let change: Vec<f64> = pairs.map(|(a, b)| a - b).collect();
         // The noise of a stiff body excuses nothing in another one.
-        let bodies = &self.places.bodies;
+        let bodies = &self.equations.places.bodies;
         let of = |vector: &[f64]| norms(&bodies.of_equation, bodies.n, vector);
         let sizes = of(&balance.residual).into_iter().zip(of(&change));
         sizes
@@ -50,7 +50,7 @@ impl Newton<'_> {
 
 /// Displacement increments larger or smaller by their last bit, as the sum over many elements
 /// scatters them.
-pub(in super::super) fn last_bit_scattered(increment: &[f64]) -> Vec<f64> {
+pub(in crate::equilibrium) fn last_bit_scattered(increment: &[f64]) -> Vec<f64> {
     // The top bit of a multiple of 2⁶⁴ / golden ratio: a scatter of signs, the same every time.
     let sign = |i: usize| {
         let top = (i as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 63;

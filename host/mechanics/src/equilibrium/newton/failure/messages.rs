@@ -45,10 +45,6 @@ impl fmt::Display for Iterations {
                 write!(f, "no equilibrium after {n} iterations{tried}")
             }
             Self::Path(n) => write!(f, "no equilibrium along the path after {n} iterations"),
-            Self::Relaxation(n) => write!(
-                f,
-                "no equilibrium by Newton iterations, nor by {n} steps of viscous relaxation"
-            ),
         }
     }
 }
