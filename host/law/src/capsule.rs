@@ -1,35 +1,39 @@
 //! A failed call of a law in its own file: everything the call depends on, so that it can be
-//! repeated bit for bit, without the case it comes from.
+//! repeated bit for bit, without the case it comes from. Numbers are written with as many digits as lead back to them.
 
 mod library;
 
 pub use library::{LibraryCapsule, LibraryPart};
 
-use crate::Error;
-use crate::FormulationDescription;
-use crate::adapter::{Adapter, Externals, Foreign, Order};
-use crate::description::words;
+use crate::call::PointStart;
+use crate::description::{FormulationDescription, hypothesis_named, words};
+use crate::foreign::Foreign;
+use crate::library::probe::Form;
 use crate::library::probe::call_log::Function;
-use crate::library::probe::{Form, PointStart};
-use crate::{BatchFailure, Law, LoadedLaw, Moment, Operator, PointCall, Request, ShearZone, Site};
+use crate::{
+    BatchFailure, Error, Law, LoadedLaw, Moment, Operator, PointCall, Request, ShearZone, Site,
+};
 use abi::Hypothesis;
-use abi::raw;
 use abi::status::Outcome;
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use text::{Source, suggestion, toml_error, write::replace};
+use text::{Source, suggestion, write::replace};
 use toml::de::DeTable;
 
 /// Name of the file in a results folder.
 pub const FILE_NAME: &str = "failure.toml";
+/// Version of the form of capsules.
+const VERSION: u32 = 1;
+
+/// Numbers by name.
+type Named = IndexMap<String, f64>;
 
 /// A failed call, and where it comes from.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Capsule {
-    /// Version of this form.
     version: u32,
     /// Whose law was called.
     pub law: LawPart,
@@ -40,19 +44,19 @@ pub struct Capsule {
     pub outcome: OutcomePart,
     /// Parameters of the law, by id.
     #[serde(default)]
-    pub parameters: IndexMap<String, f64>,
+    pub parameters: Named,
     call: CallPart,
     #[serde(default)]
     start: Values,
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Values::is_empty")]
     end: Values,
     /// How a check has called it, if replaying it is to do the same.
     pub probe: Option<ProbePart>,
     /// The points of its batch behind the first one.
-    #[serde(default, rename = "point")]
+    #[serde(default, rename = "point", skip_serializing_if = "Vec::is_empty")]
     more: Vec<PointPart>,
     /// Points that were called for before.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     before: Vec<PointPart>,
     /// The file it was read from.
     #[serde(skip)]
@@ -60,7 +64,7 @@ pub struct Capsule {
 }
 
 /// The law of a capsule.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LawPart {
     /// Id of the law.
@@ -73,20 +77,14 @@ pub struct LawPart {
     pub library: PathBuf,
     /// SHA-256 of that.
     pub sha256: String,
-    /// The program that the library is made for, if not for the contract.
-    pub adapter: Option<Adapter>,
-    /// What describes it.
-    pub sidecar: Option<PathBuf>,
-    /// What becomes of routines that nobody supplies.
-    pub externals: Option<Externals>,
-    /// How the routine leaves its stiffness.
-    pub tangent_order: Option<Order>,
+    /// The library as a file would name it, if it keeps no contract.
+    foreign: Option<Foreign>,
     /// The zone that it fills, if the call is one of an interface that it is made to.
     pub shear_zone: Option<ShearZone>,
 }
 
 /// What became of a call.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OutcomePart {
     /// Name of the outcome.
@@ -97,14 +95,15 @@ pub struct OutcomePart {
     pub step_factor: Option<f64>,
 }
 
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CallPart {
     request: String,
     time: f64,
     time_increment: f64,
-    moment: Option<MomentPart>,
-    site: Option<SitePart>,
+    /// Laws of the contract do not ask, nor for the next.
+    moment: Option<Moment>,
+    site: Option<Site>,
 }
 
 /// A call as a check makes it.
@@ -118,63 +117,94 @@ pub struct ProbePart {
 }
 
 /// A point of a batch.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PointPart {
     start: Values,
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Values::is_empty")]
     end: Values,
 }
 
-/// Number of the step; laws of the contract do not ask.
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct MomentPart {
-    step: u32,
-    increment: u32,
-    start: f64,
-    #[serde(default = "one")]
-    length: f64,
-    #[serde(default)]
-    undrained: bool,
+/// Gradients, fluxes and internal variables by name: of a solid strains and stresses, of an interface jumps and tractions.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct Values {
+    #[serde(skip_serializing_if = "Named::is_empty")]
+    strain: Named,
+    #[serde(skip_serializing_if = "Named::is_empty")]
+    jump: Named,
+    #[serde(skip_serializing_if = "Named::is_empty")]
+    stress: Named,
+    #[serde(skip_serializing_if = "Named::is_empty")]
+    traction: Named,
+    #[serde(skip_serializing_if = "Named::is_empty")]
+    internal: Named,
 }
 
-impl MomentPart {
-    fn of(moment: Moment) -> Self {
-        Self {
-            step: moment.step,
-            increment: moment.increment,
-            start: moment.step_start,
-            length: moment.step_length,
-            undrained: moment.is_undrained,
+impl Values {
+    fn of(hypothesis: Hypothesis, gradient: Named, flux: Named, internal: Named) -> Self {
+        let none = Self {
+            internal,
+            ..Self::default()
+        };
+        if hypothesis.is_interface() {
+            Self {
+                jump: gradient,
+                traction: flux,
+                ..none
+            }
+        } else {
+            Self {
+                strain: gradient,
+                stress: flux,
+                ..none
+            }
         }
+    }
+
+    fn gradient(&self) -> &Named {
+        if self.jump.is_empty() {
+            &self.strain
+        } else {
+            &self.jump
+        }
+    }
+
+    fn flux(&self) -> &Named {
+        if self.traction.is_empty() {
+            &self.stress
+        } else {
+            &self.traction
+        }
+    }
+
+    fn is_empty(&self) -> bool {
+        [self.gradient(), self.flux(), &self.internal]
+            .iter()
+            .all(|values| values.is_empty())
     }
 }
 
-/// How long a phase or segment takes where nothing is reported of it.
-fn one() -> f64 {
-    1.0
-}
-
-/// Where the point lies; laws of the contract do not ask.
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct SitePart {
-    position: [f64; 2],
-    length: f64,
-    element: u32,
-    point: u32,
-}
-
-/// Gradients, fluxes and internal variables by name.
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct Values {
-    #[serde(alias = "strain")]
-    jump: IndexMap<String, f64>,
-    #[serde(alias = "stress")]
-    traction: IndexMap<String, f64>,
-    internal: IndexMap<String, f64>,
+impl PointPart {
+    fn of(
+        point: &PointStart,
+        hypothesis: Hypothesis,
+        formulation: &FormulationDescription,
+    ) -> Self {
+        let components = |values: &[f64]| -> Named {
+            let names = hypothesis.components().iter();
+            let names = names.map(|name| (*name).to_owned());
+            names.zip(values.iter().copied()).collect()
+        };
+        let ids = formulation.internal_variables.iter().map(|v| v.id.clone());
+        let internal = ids.zip(point.state0.iter().copied()).collect();
+        let (gradient, flux) = (components(&point.gradient0), components(&point.flux0));
+        let gradient_end = components(&point.gradient1);
+        Self {
+            start: Values::of(hypothesis, gradient, flux, internal),
+            end: Values::of(hypothesis, gradient_end, Named::new(), Named::new()),
+        }
+    }
 }
 
 /// Names of the requests in files.
@@ -203,24 +233,11 @@ fn name(request: Request) -> &'static str {
         .map_or(CREATE, |(name, _)| name)
 }
 
-/// The operator that a call of a check asks for.
-fn operator(request: u32) -> Operator {
-    if request & raw::PILUM_REQ_ELASTIC != 0 {
-        Operator::Elastic
-    } else if request & raw::PILUM_REQ_TANGENT != 0 {
-        Operator::Consistent
-    } else {
-        Operator::None
-    }
-}
-
 /// The form of a call of a check that is as usual.
 fn usual(request: &str, time: f64, time_increment: f64) -> Form {
     let named = REQUESTS.iter().find(|(name, _)| *name == request);
     let bits = match named.map(|(_, request)| *request) {
-        Some(Request::Update(Operator::Elastic)) => raw::PILUM_REQ_FLUX | raw::PILUM_REQ_ELASTIC,
-        Some(Request::Update(Operator::Consistent)) => raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT,
-        Some(Request::Update(Operator::None)) => raw::PILUM_REQ_FLUX,
+        Some(Request::Update(operator)) => operator.request(),
         Some(Request::InitialState) | None => 0,
     };
     Form {
@@ -230,87 +247,24 @@ fn usual(request: &str, time: f64, time_increment: f64) -> Form {
     }
 }
 
-/// What capsules say of a library that keeps no contract, next to its file.
-#[derive(Clone, Debug, Default)]
-struct Made {
-    adapter: Option<Adapter>,
-    sidecar: Option<PathBuf>,
-    externals: Option<Externals>,
-    tangent_order: Option<Order>,
-}
-
-impl Made {
-    fn of(foreign: Option<&Foreign>) -> Self {
-        foreign.map_or_else(Self::default, |foreign| Self {
-            adapter: Some(foreign.adapter),
-            sidecar: foreign.sidecar.clone(),
-            externals: foreign.externals,
-            tangent_order: foreign.tangent_order,
-        })
-    }
-
-    /// The library as a file would name it, called in this process, if it keeps no contract.
-    fn foreign(self, library: &Path) -> Option<Foreign> {
-        Some(Foreign {
-            adapter: self.adapter?,
-            library: library.to_owned(),
-            sidecar: self.sidecar,
-            in_process: true,
-            record: None,
-            records_once: false,
-            externals: self.externals,
-            scratch: None,
-            tangent_order: self.tangent_order,
-        })
-    }
-}
-
-impl std::fmt::Display for Made {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let sidecar = self.sidecar.as_ref().map(|path| path.to_string_lossy());
-        for (key, value) in [
-            ("adapter", self.adapter.map(Adapter::name)),
-            ("sidecar", sidecar.as_deref()),
-            ("externals", self.externals.map(Externals::name)),
-            ("tangent_order", self.tangent_order.map(Order::name)),
-        ] {
-            if let Some(value) = value {
-                writeln!(f, "{key} = {}", text(value))?;
-            }
-        }
-        Ok(())
-    }
-}
-
 impl LawPart {
-    fn made(&self) -> Made {
-        Made {
-            adapter: self.adapter,
-            sidecar: self.sidecar.clone(),
-            externals: self.externals,
-            tangent_order: self.tangent_order,
-        }
-    }
-
     /// The library as a file would name it, called in this process, if it keeps no contract.
     pub fn foreign(&self) -> Option<Foreign> {
-        self.made().foreign(&self.library)
+        let foreign = self.foreign.as_ref();
+        foreign.map(|foreign| foreign.of_capsule(&self.library))
     }
 
     fn of(law: &LoadedLaw, hypothesis: Hypothesis) -> Option<Self> {
-        let description = law.description();
-        let library = law.library();
-        let made = Made::of(library.foreign());
+        let (description, library) = (law.description(), law.library());
+        let path = std::path::absolute(library.path()).ok()?;
+        let foreign = library.foreign();
         Some(Self {
             id: description.id.clone(),
             version: description.version.clone(),
             hypothesis: hypothesis.name().to_owned(),
-            library: std::path::absolute(library.path()).ok()?,
+            foreign: foreign.map(|foreign| foreign.of_capsule(&path)),
+            library: path.to_string_lossy().into_owned().into(),
             sha256: library.sha256().to_owned(),
-            adapter: made.adapter,
-            sidecar: made.sidecar,
-            externals: made.externals,
-            tangent_order: made.tangent_order,
             shear_zone: law.shear_zone(),
         })
     }
@@ -321,50 +275,25 @@ impl Capsule {
     /// key.
     pub fn of(law: &Law, failure: &BatchFailure, origin: Vec<(&str, toml::Value)>) -> Option<Self> {
         let call = failure.call.as_deref()?;
-        let hypothesis = law.hypothesis();
-        let description = law.description();
-        let components = |values: &[f64]| -> IndexMap<String, f64> {
-            let names = hypothesis.components().iter();
-            let names = names.map(|name| (*name).to_owned());
-            names.zip(values.iter().copied()).collect()
-        };
-        let variables = law.formulation().internal_variables.iter();
-        let ids = description.parameters.iter().map(|p| p.id.clone());
-        let request = REQUESTS.iter().find(|(_, r)| *r == call.request)?.0;
-        let foreign = law.library().foreign();
+        let loaded = law.loaded();
+        let foreign = loaded.library().foreign();
+        let part = PointPart::of(&call.start, law.hypothesis(), law.formulation());
+        let origin = origin.into_iter();
         Some(Self {
-            version: 1,
-            law: LawPart::of(law.loaded(), hypothesis)?,
-            origin: origin
-                .into_iter()
-                .map(|(key, value)| (key.to_owned(), value))
-                .collect(),
+            version: VERSION,
+            law: LawPart::of(loaded, law.hypothesis())?,
+            origin: origin.map(|(key, value)| (key.to_owned(), value)).collect(),
             outcome: OutcomePart::of(failure),
-            parameters: ids.zip(law.parameters().iter().copied()).collect(),
+            parameters: parameters(loaded, law.parameters()),
             call: CallPart {
-                request: request.to_owned(),
+                request: name(call.request).to_owned(),
                 time: call.time,
                 time_increment: call.time_increment,
-                moment: foreign.map(|_| MomentPart::of(call.moment)),
-                site: foreign.map(|_| SitePart {
-                    position: call.site.position,
-                    length: call.site.length,
-                    element: call.site.element,
-                    point: call.site.point,
-                }),
+                moment: foreign.map(|_| call.moment),
+                site: foreign.map(|_| call.site),
             },
-            start: Values {
-                jump: components(&call.gradient),
-                traction: components(&call.flux),
-                internal: variables
-                    .map(|v| v.id.clone())
-                    .zip(call.state.iter().copied())
-                    .collect(),
-            },
-            end: Values {
-                jump: components(&call.gradient_end),
-                ..Values::default()
-            },
+            start: part.start,
+            end: part.end,
             probe: None,
             more: Vec::new(),
             before: Vec::new(),
@@ -377,39 +306,20 @@ impl Capsule {
     pub fn of_probe(
         law: &LoadedLaw,
         formulation: &FormulationDescription,
-        (hypothesis, parameters): (Hypothesis, &[f64]),
+        (hypothesis, values): (Hypothesis, &[f64]),
         (function, form): (Function, Form),
         points: &[PointStart],
         before: &[PointStart],
     ) -> Option<Self> {
-        let named = |values: &[f64]| -> IndexMap<String, f64> {
-            let names = hypothesis.components().iter();
-            let names = names.map(|name| (*name).to_owned());
-            names.zip(values.iter().copied()).collect()
-        };
-        let part = |point: &PointStart| {
-            let ids = formulation.internal_variables.iter().map(|v| v.id.clone());
-            PointPart {
-                start: Values {
-                    jump: named(&point.gradient0),
-                    traction: named(&point.flux0),
-                    internal: ids.zip(point.state0.iter().copied()).collect(),
-                },
-                end: Values {
-                    jump: named(&point.gradient1),
-                    ..Values::default()
-                },
-            }
-        };
+        let part = |point: &PointStart| PointPart::of(point, hypothesis, formulation);
         let mut parts = points.iter().map(part);
         let first = parts.next();
         let (start, end) = first.map_or_else(Default::default, |p| (p.start, p.end));
-        let ids = law.description().parameters.iter().map(|p| p.id.clone());
         let request = match function {
             Function::Create => CREATE,
             Function::Destroy => DESTROY,
             Function::InitState => name(Request::InitialState),
-            Function::Integrate => name(Request::Update(operator(form.request))),
+            Function::Integrate => name(Request::Update(Operator::of_request(form.request))),
         };
         let is_usual = form == usual(request, form.time, form.time_increment);
         // Those that keep no contract are called as in a run; before the first call there is none.
@@ -422,7 +332,7 @@ impl Capsule {
             form: (!is_usual).then_some(form),
         });
         Some(Self {
-            version: 1,
+            version: VERSION,
             law: LawPart::of(law, hypothesis)?,
             origin: IndexMap::new(),
             outcome: OutcomePart {
@@ -430,12 +340,12 @@ impl Capsule {
                 message: String::new(),
                 step_factor: None,
             },
-            parameters: ids.zip(parameters.iter().copied()).collect(),
+            parameters: parameters(law, values),
             call: CallPart {
                 request: request.to_owned(),
                 time: when.map_or(form.time, |(time, _)| time),
                 time_increment: form.time_increment,
-                moment: when.map(|(_, moment)| MomentPart::of(moment)),
+                moment: when.map(|(_, moment)| moment),
                 site: None,
             },
             start,
@@ -458,8 +368,10 @@ impl Capsule {
     #[must_use]
     pub fn shortened(&self, fraction: f64) -> Self {
         let mut shorter = self.clone();
-        for (name, end) in &mut shorter.end.jump {
-            let start = self.start.jump.get(name).copied().unwrap_or_default();
+        let starts = self.start.gradient();
+        let ends = &mut shorter.end;
+        for (name, end) in ends.jump.iter_mut().chain(&mut ends.strain) {
+            let start = starts.get(name).copied().unwrap_or_default();
             *end = start + fraction * (*end - start);
         }
         shorter
@@ -474,42 +386,58 @@ impl Capsule {
         hypothesis: Hypothesis,
         formulation: &FormulationDescription,
     ) -> Result<[Vec<PointStart>; 2], Error> {
-        let (gradient, flux) = words(hypothesis);
-        let point = |start: &Values, end: &Values, key: &str| -> Result<PointStart, Error> {
-            let components = |values: &IndexMap<String, f64>, what: &str| {
-                if values.is_empty() {
-                    return Ok(Vec::new());
-                }
-                let names = hypothesis.components().iter().copied();
-                self.in_order(values, names, &[key, what], what)
-            };
-            let variables = formulation.internal_variables.iter();
-            let state0 = if start.internal.is_empty() {
-                Vec::new()
-            } else {
-                let ids = variables.map(|v| v.id.as_str());
-                let what = "internal variable";
-                self.in_order(&start.internal, ids, &[key, "internal"], what)?
-            };
-            Ok(PointStart {
-                gradient0: components(&start.jump, gradient)?,
-                gradient1: components(&end.jump, gradient)?,
-                flux0: components(&start.traction, flux)?,
-                state0,
-            })
-        };
+        let law = (hypothesis, formulation);
         let all = |parts: &[PointPart], key: &str| -> Result<Vec<PointStart>, Error> {
             let parts = parts.iter();
-            parts
-                .map(|part| point(&part.start, &part.end, key))
-                .collect()
+            let point =
+                |part: &PointPart| self.point(law, (&part.start, &part.end), [key, key], false);
+            parts.map(point).collect()
         };
         let mut points = Vec::new();
-        if !self.start.traction.is_empty() {
-            points.push(point(&self.start, &self.end, "start")?);
+        if !self.start.flux().is_empty() {
+            let first = (&self.start, &self.end);
+            points.push(self.point(law, first, ["start", "end"], false)?);
         }
         points.extend(all(&self.more, "point")?);
         Ok([points, all(&self.before, "before")?])
+    }
+
+    /// A point in the order of a law's values. `keys` lead to its start and end; what is left out stays so unless
+    /// `is_whole`.
+    fn point(
+        &self,
+        (hypothesis, formulation): (Hypothesis, &FormulationDescription),
+        (start, end): (&Values, &Values),
+        keys: [&str; 2],
+        is_whole: bool,
+    ) -> Result<PointStart, Error> {
+        let (gradient, flux) = words(hypothesis);
+        let in_order = |values: &Named, names: &[&str], keys: &[&str], what: &str| {
+            if values.is_empty() && !is_whole {
+                return Ok(Vec::new());
+            }
+            self.in_order(values, names.iter().copied(), keys, what)
+        };
+        let components = hypothesis.components();
+        let variables = formulation.internal_variables.iter();
+        let ids: Vec<&str> = variables.map(|v| v.id.as_str()).collect();
+        let [at_start, at_end] = keys;
+        Ok(PointStart {
+            gradient0: in_order(
+                start.gradient(),
+                components,
+                &[at_start, gradient],
+                gradient,
+            )?,
+            gradient1: in_order(end.gradient(), components, &[at_end, gradient], gradient)?,
+            flux0: in_order(start.flux(), components, &[at_start, flux], flux)?,
+            state0: in_order(
+                &start.internal,
+                &ids,
+                &[at_start, "internal"],
+                "internal variable",
+            )?,
+        })
     }
 
     /// The same for one of its points alone.
@@ -526,7 +454,7 @@ impl Capsule {
 
     /// Number of points.
     pub fn n_points(&self) -> usize {
-        usize::from(!self.start.traction.is_empty()) + self.more.len()
+        usize::from(!self.start.flux().is_empty()) + self.more.len()
     }
 
     /// Reads a capsule.
@@ -546,10 +474,9 @@ impl Capsule {
     // of what this crate takes to compile.
     #[inline]
     pub fn of_source(source: Source) -> Result<Self, Error> {
-        let mut capsule: Self =
-            toml::from_str(source.text()).map_err(|why| toml_error(&source, &why))?;
+        let mut capsule: Self = text::parse_any_numbers(&source)?;
         capsule.source = Some(source);
-        if capsule.version != 1 {
+        if capsule.version != VERSION {
             let message = format!("this is a capsule of version {}", capsule.version);
             return Err(capsule.error(&["version"], message));
         }
@@ -594,8 +521,7 @@ impl Capsule {
 
     /// The hypothesis of the law.
     pub fn hypothesis(&self) -> Option<Hypothesis> {
-        let mut all = Hypothesis::ALL.into_iter();
-        all.find(|h| h.name() == self.law.hypothesis)
+        hypothesis_named(&self.law.hypothesis)
     }
 
     fn request(&self) -> Option<Request> {
@@ -631,138 +557,20 @@ pub fn status(outcome: Outcome) -> &'static str {
     }
 }
 
-/// A number that reads back to the same bits.
-fn real(value: f64) -> String {
-    if value.is_nan() {
-        "nan".to_owned()
-    } else {
-        format!("{value:?}")
-    }
-}
-
-fn text(text: &str) -> String {
-    toml::Value::from(text).to_string()
-}
-
-fn table(values: &IndexMap<String, f64>) -> String {
-    let entries: Vec<String> = values
-        .iter()
-        .map(|(name, value)| format!("{name} = {}", real(*value)))
-        .collect();
-    format!("{{ {} }}", entries.join(", "))
+/// Values of a law's parameters by id.
+fn parameters(law: &LoadedLaw, values: &[f64]) -> Named {
+    let ids = law.description().parameters.iter().map(|p| p.id.clone());
+    ids.zip(values.iter().copied()).collect()
 }
 
 impl std::fmt::Display for Capsule {
-    #[expect(clippy::too_many_lines, reason = "the file from its head to its end")]
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let (gradient, flux) = self.hypothesis().map_or(("jump", "traction"), words);
-        writeln!(
+        let text = toml::to_string(self).map_err(|_| std::fmt::Error)?;
+        write!(
             f,
             "# A call of a law that failed. `pilum replay` repeats it: numbers read back to the same \
-             bits.\nversion = {}\n",
-            self.version
-        )?;
-        let law = &self.law;
-        writeln!(
-            f,
-            "[law]\nid = {}\nversion = {}\nhypothesis = {}\nlibrary = {}\nsha256 = {}",
-            text(&law.id),
-            text(&law.version),
-            text(&law.hypothesis),
-            text(&law.library.to_string_lossy()),
-            text(&law.sha256)
-        )?;
-        write!(f, "{}", law.made())?;
-        if let Some(zone) = law.shear_zone {
-            writeln!(f, "shear_zone = {zone}")?;
-        }
-        writeln!(f)?;
-        writeln!(f, "[where]")?;
-        for (key, value) in &self.origin {
-            writeln!(f, "{key} = {value}")?;
-        }
-        let outcome = &self.outcome;
-        writeln!(
-            f,
-            "\n[outcome]\nstatus = {}\nmessage = {}",
-            text(&outcome.status),
-            text(&outcome.message)
-        )?;
-        if let Some(factor) = outcome.step_factor {
-            writeln!(f, "step_factor = {}", real(factor))?;
-        }
-        writeln!(f, "\n[parameters]")?;
-        for (id, value) in &self.parameters {
-            writeln!(f, "{id} = {}", real(*value))?;
-        }
-        writeln!(
-            f,
-            "\n[call]\nrequest = {}\ntime = {}\ntime_increment = {}",
-            text(&self.call.request),
-            real(self.call.time),
-            real(self.call.time_increment)
-        )?;
-        if let Some(moment) = &self.call.moment {
-            let (step, increment) = (moment.step, moment.increment);
-            let [start, length] = [moment.start, moment.length].map(real);
-            let undrained = if moment.undrained {
-                ", undrained = true"
-            } else {
-                ""
-            };
-            writeln!(
-                f,
-                "moment = {{ step = {step}, increment = {increment}, start = {start}, length = {length}{undrained} }}"
-            )?;
-        }
-        if let Some(site) = &self.call.site {
-            let [x, y] = site.position.map(real);
-            writeln!(
-                f,
-                "site = {{ position = [{x}, {y}], length = {}, element = {}, point = {} }}",
-                real(site.length),
-                site.element,
-                site.point
-            )?;
-        }
-        writeln!(f, "\n[start]")?;
-        let entries = |values: &Values| -> Vec<String> {
-            [
-                (gradient, &values.jump),
-                (flux, &values.traction),
-                ("internal", &values.internal),
-            ]
-            .into_iter()
-            .filter(|(_, values)| !values.is_empty())
-            .map(|(name, values)| format!("{name} = {}", table(values)))
-            .collect()
-        };
-        entries(&self.start)
-            .iter()
-            .try_for_each(|line| writeln!(f, "{line}"))?;
-        if !self.end.jump.is_empty() {
-            writeln!(f, "\n[end]\n{gradient} = {}", table(&self.end.jump))?;
-        }
-        if let Some(probe) = &self.probe {
-            let whole = toml::Value::try_from(probe).map_err(|_| std::fmt::Error)?;
-            writeln!(f, "\n[probe]")?;
-            for (key, value) in whole.as_table().into_iter().flatten() {
-                writeln!(f, "{key} = {value}")?;
-            }
-        }
-        for (key, points) in [("point", &self.more), ("before", &self.before)] {
-            for point in points {
-                writeln!(
-                    f,
-                    "\n[[{key}]]\nstart = {{ {} }}",
-                    entries(&point.start).join(", ")
-                )?;
-                if !point.end.jump.is_empty() {
-                    writeln!(f, "end = {{ {} }}", entries(&point.end).join(", "))?;
-                }
-            }
-        }
-        Ok(())
+             bits.\n{text}"
+        )
     }
 }
 
@@ -794,7 +602,7 @@ impl Capsule {
     /// The name that is missing, or too much.
     pub fn in_order<'a>(
         &self,
-        values: &IndexMap<String, f64>,
+        values: &Named,
         names: impl Iterator<Item = &'a str> + Clone,
         keys: &[&str],
         what: &str,
@@ -824,50 +632,16 @@ impl Capsule {
             let message = format!("there is no request `{}`", self.call.request);
             self.error(&["call", "request"], message)
         })?;
-        let (gradient, flux) = words(law.hypothesis());
-        let components = |values: &IndexMap<String, f64>, part: &str, what: &str| {
-            if values.is_empty() && request == Request::InitialState {
-                return Ok(Vec::new());
-            }
-            let names = law.hypothesis().components().iter().copied();
-            self.in_order(values, names, &[part, what], what)
-        };
-        let variables = law.formulation().internal_variables.iter();
-        let state = if request == Request::InitialState {
-            Vec::new()
-        } else {
-            let ids = variables.map(|v| v.id.as_str());
-            self.in_order(
-                &self.start.internal,
-                ids,
-                &["start", "internal"],
-                "internal variable",
-            )?
-        };
+        let is_whole = request != Request::InitialState;
+        let law = (law.hypothesis(), law.formulation());
+        let part = (&self.start, &self.end);
         Ok(PointCall {
             request,
+            start: self.point(law, part, ["start", "end"], is_whole)?,
             time: self.call.time,
             time_increment: self.call.time_increment,
-            gradient: components(&self.start.jump, "start", gradient)?,
-            gradient_end: components(&self.end.jump, "end", gradient)?,
-            flux: components(&self.start.traction, "start", flux)?,
-            state,
-            moment: self
-                .call
-                .moment
-                .map_or_else(Moment::default, |moment| Moment {
-                    step: moment.step,
-                    increment: moment.increment,
-                    step_start: moment.start,
-                    step_length: moment.length,
-                    is_undrained: moment.undrained,
-                }),
-            site: self.call.site.map_or_else(Site::default, |site| Site {
-                position: site.position,
-                length: site.length,
-                element: site.element,
-                point: site.point,
-            }),
+            moment: self.call.moment.unwrap_or_default(),
+            site: self.call.site.unwrap_or_default(),
         })
     }
 }
@@ -887,14 +661,13 @@ mod tests {
             1e16,
             -1.0 / 3.0,
             f64::INFINITY,
+            f64::NEG_INFINITY,
+            f64::NAN,
         ];
         for value in values {
-            let line = format!("x = {}", real(value));
-            let read: IndexMap<String, f64> = toml::from_str(&line).unwrap();
-            assert_eq!(read["x"].to_bits(), value.to_bits(), "{line}");
+            let text = toml::to_string(&Named::from([("x".to_owned(), value)])).unwrap();
+            let read: Named = toml::from_str(&text).unwrap();
+            assert_eq!(read["x"].to_bits(), value.to_bits(), "{text}");
         }
-        let read: IndexMap<String, f64> =
-            toml::from_str(&format!("x = {}", real(f64::NAN))).unwrap();
-        assert!(read["x"].is_nan());
     }
 }

@@ -1,6 +1,7 @@
 //! A law built from values by name: each held against what the law says of its parameters.
 
-use crate::{Law, LawDescription, LoadedLaw, ParameterDescription, process_state};
+use crate::process::process_state;
+use crate::{Law, LawDescription, LoadedLaw, ParameterDescription};
 use abi::Hypothesis;
 use std::fmt;
 use text::suggestion;
@@ -66,8 +67,8 @@ pub enum BuildCause {
     Nothing(String),
     /// It is made for other hypotheses.
     Hypothesis {
-        /// Those that it offers, in words.
-        offered: String,
+        /// Names of those that it offers.
+        offered: Vec<&'static str>,
         /// The one that was asked for.
         wanted: Hypothesis,
     },
@@ -118,7 +119,8 @@ impl fmt::Display for BuildFailure {
             BuildCause::Nothing(why) => write!(f, "law `{law}`: {why}"),
             BuildCause::Hypothesis { offered, wanted } => write!(
                 f,
-                "law `{law}` is made for {offered}, expected {}",
+                "law `{law}` is made for {}, expected {}",
+                offered.join(", "),
                 wanted.name()
             ),
             BuildCause::Unknown(_) => write!(f, "law `{law}` has no parameter `{id}`"),
@@ -281,7 +283,11 @@ fn not_offered(description: &LawDescription, wanted: Hypothesis) -> BuildCause {
         return BuildCause::Nothing(description.doc.clone());
     }
     BuildCause::Hypothesis {
-        offered: description.hypotheses(),
+        offered: description
+            .formulations
+            .iter()
+            .map(|f| f.hypothesis)
+            .collect(),
         wanted,
     }
 }

@@ -4,7 +4,7 @@ use abi::Hypothesis;
 use serde::{Deserialize, Deserializer, Serialize, de};
 
 /// A law as described by its library.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct LawDescription {
     /// Identifier.
     pub id: String,
@@ -39,10 +39,42 @@ impl LawDescription {
         let names: Vec<&str> = self.formulations.iter().map(|f| f.hypothesis).collect();
         names.join(", ")
     }
+
+    /// With words for what a library made for another program does not tell of its law.
+    pub(crate) fn completed(self) -> Self {
+        Self {
+            name: or(self.name, &self.id),
+            version: or(self.version, "unversioned"),
+            author: or(self.author, "unknown"),
+            licence: or(self.licence, "unknown licence"),
+            references: or(self.references, "none given"),
+            ..self
+        }
+    }
+}
+
+/// A text, or another if it is empty.
+pub(crate) fn or(text: String, other: &str) -> String {
+    if text.is_empty() {
+        other.to_owned()
+    } else {
+        text
+    }
+}
+
+/// The hypothesis of this name.
+pub(crate) fn hypothesis_named(name: &str) -> Option<Hypothesis> {
+    Hypothesis::ALL.into_iter().find(|h| h.name() == name)
+}
+
+/// Whether an id is made of a-z, 0-9 and _, and starts with a letter.
+pub(crate) fn is_identifier(text: &str) -> bool {
+    let is_part = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+    text.starts_with(|c: char| c.is_ascii_lowercase()) && text.chars().all(is_part)
 }
 
 /// A parameter as described by its library.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct ParameterDescription {
     /// Identifier.
     pub id: String,
@@ -77,7 +109,24 @@ pub struct Bounds {
     pub open_upper: bool,
 }
 
+impl Default for Bounds {
+    /// Any value.
+    fn default() -> Self {
+        Self::closed(f64::NEG_INFINITY, f64::INFINITY)
+    }
+}
+
 impl Bounds {
+    /// Both ends belong to it.
+    pub(crate) fn closed(lower: f64, upper: f64) -> Self {
+        Self {
+            lower,
+            open_lower: false,
+            upper,
+            open_upper: false,
+        }
+    }
+
     /// Whether a value lies inside. NaN does not.
     pub fn contain(&self, value: f64) -> bool {
         let above = if self.open_lower {
@@ -141,7 +190,7 @@ type HypothesisName = &'static str;
 
 /// What a law offers under one hypothesis.
 #[expect(clippy::struct_excessive_bools, reason = "flags of the contract")]
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct FormulationDescription {
     /// Name of the hypothesis.
     #[serde(deserialize_with = "hypothesis")]
@@ -169,20 +218,19 @@ pub struct FormulationDescription {
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde calls it")]
-fn is_false(value: &bool) -> bool {
+pub(crate) fn is_false(value: &bool) -> bool {
     !value
 }
 
 fn hypothesis<'de, D: Deserializer<'de>>(input: D) -> Result<&'static str, D::Error> {
     let name = String::deserialize(input)?;
-    let mut known = Hypothesis::ALL.into_iter().map(Hypothesis::name);
-    known
-        .find(|known| *known == name)
+    hypothesis_named(&name)
+        .map(Hypothesis::name)
         .ok_or_else(|| de::Error::custom(format!("there is no hypothesis `{name}`")))
 }
 
 /// An internal variable (one component of it, if it has several).
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct InternalVariable {
     /// Identifier; with `_<component>` if there are several components.
     pub id: String,

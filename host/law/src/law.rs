@@ -1,14 +1,12 @@
 //! A law with its parameters, as elements call it.
 
-use crate::adapter::ForeignInstance;
-use crate::current_call::{self, Doing};
-#[cfg(unix)]
-use crate::isolate;
-use crate::library::{Call, OwnedInstance, Strided};
-use crate::shear_zone::ZoneInstance;
+use crate::call::{Outcomes, PointCall};
+use crate::instance::Instance;
+use crate::process::current_call::{self, Doing};
+use crate::process::process_state;
 use crate::{
     BatchFailure, BatchSuccess, End, FormulationDescription, LawDescription, Library, LoadedLaw,
-    Moment, Operator, PointCall, Request, Site, Start, Tangent,
+    Moment, Operator, Request, Start, Strided, Tangent,
 };
 use abi::Hypothesis;
 use abi::raw::{self, Status};
@@ -22,55 +20,11 @@ pub struct Law {
     pub(crate) hypothesis: Hypothesis,
     pub(crate) formulation: FormulationDescription,
     pub(crate) parameters: Vec<f64>,
-    pub(crate) instance: LawInstance,
+    pub(crate) instance: Box<dyn Instance>,
     /// Its name where calls are watched.
     pub(crate) name: u64,
     /// What it had changed of the process as it was built.
     pub(crate) changes: Vec<String>,
-}
-
-/// What a library made of the parameters, in this process or in workers.
-#[derive(Debug)]
-pub(crate) enum LawInstance {
-    Here(OwnedInstance),
-    Foreign(Box<dyn ForeignInstance>),
-    #[cfg(unix)]
-    Apart(Box<isolate::IsolatedInstance>),
-    Zone(ZoneInstance),
-}
-
-impl LawInstance {
-    /// Asks for initial internal variables. `None` if the law has no `init_state`.
-    pub(crate) fn init_state(&self, call: Call<'_>) -> Option<(Status, String)> {
-        match self {
-            Self::Here(instance) => instance.init_state(call),
-            Self::Foreign(instance) => instance.init_state(call),
-            #[cfg(unix)]
-            Self::Apart(instance) => instance.init_state(call),
-            Self::Zone(zone) => Some(zone.init_state(call)),
-        }
-    }
-
-    /// Carries the points over the increment. Returns the most severe status and a message.
-    pub(crate) fn integrate(&self, call: Call<'_>) -> (Status, String) {
-        match self {
-            Self::Here(instance) => instance.integrate(call),
-            Self::Foreign(instance) => instance.integrate(call),
-            #[cfg(unix)]
-            Self::Apart(instance) => instance.integrate(call),
-            Self::Zone(zone) => zone.integrate(call),
-        }
-    }
-
-    pub(crate) fn take_overwritten(&self) -> Vec<String> {
-        match self {
-            Self::Here(_) => Vec::new(),
-            Self::Foreign(instance) => instance.take_overwritten(),
-            #[cfg(unix)]
-            Self::Apart(instance) => instance.take_overwritten(),
-            Self::Zone(zone) => zone.take_overwritten(),
-        }
-    }
 }
 
 /// Why a law's response depends on how long an increment takes.
@@ -89,6 +43,68 @@ impl std::fmt::Display for TimeDependence {
             Self::Declared => Ok(()),
             Self::By(id, value, unit) => write!(f, " (`{id}` is {value} {unit})"),
         }
+    }
+}
+
+/// Why a law cannot be built.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CreateFailure {
+    /// The parameter to change, if the law names one.
+    pub parameter: Option<String>,
+    /// Why.
+    pub reason: String,
+    /// The fault is the library's, not the parameter's.
+    pub library_at_fault: bool,
+}
+
+impl LoadedLaw {
+    /// Fixes the parameters (in declared order; NaN: left out) under a hypothesis.
+    ///
+    /// # Errors
+    /// The law's refusal, or a defect of the library.
+    pub fn build(&self, hypothesis: Hypothesis, parameters: &[f64]) -> Result<Law, CreateFailure> {
+        let description = self.description();
+        let defect = |reason: &str| CreateFailure {
+            parameter: None,
+            reason: reason.to_owned(),
+            library_at_fault: true,
+        };
+        let formulation = description
+            .formulation(hypothesis)
+            .ok_or_else(|| defect("the hypothesis is not offered"))?
+            .clone();
+        let name = current_call::name(&format!(
+            "law `{}` of library {}",
+            description.id,
+            self.library.path.display()
+        ));
+        current_call::remember_process();
+        let source = &self.opened().source;
+        let create = || source.create(hypothesis, &formulation, parameters);
+        let created = current_call::calling(name, Doing::Create, 0, Moment::default(), create);
+        let changes = process_state::restore().map_err(|why| defect(&why))?;
+        let instance = created.map_err(|(status, message)| {
+            // Contract, "create": a message about one parameter starts with its id.
+            let parameter = message
+                .split_once(':')
+                .map(|(id, _)| id.trim())
+                .filter(|id| description.parameters.iter().any(|p| p.id == *id))
+                .map(str::to_owned);
+            CreateFailure {
+                parameter,
+                reason: message,
+                library_at_fault: status != raw::PILUM_E_PARAMETER && status != raw::PILUM_E_DOMAIN,
+            }
+        })?;
+        Ok(Law {
+            loaded: self.clone(),
+            hypothesis,
+            formulation,
+            parameters: parameters.to_vec(),
+            instance,
+            name,
+            changes,
+        })
     }
 }
 
@@ -231,60 +247,24 @@ impl Law {
         flux: (&[f64], Strided),
     ) -> Result<Vec<f64>, BatchFailure> {
         let n_states = self.n_states();
-        let initial = self
-            .formulation
-            .internal_variables
-            .iter()
-            .map(|v| v.initial_value);
-        let mut state: Vec<f64> = initial.cycle().take(n_points * n_states).collect();
-        let mut status = vec![raw::PILUM_E_INTERNAL; n_points];
-        let mut factor = vec![0.0; n_points];
-        let call = Call {
-            request: 0,
-            n_points,
-            n_components: self.n_components(),
-            n_states,
-            time: 0.0,
-            time_increment: 0.0,
-            moment: Moment::default(),
-            sites: &[],
-            gradient0: None,
-            gradient1: None,
-            flux0: flux,
-            state0: &[],
-            flux1: None,
-            state1: &mut state,
-            tangent: &mut [],
-            status: &mut status,
-            step_factor: &mut factor,
+        let variables = self.formulation.internal_variables.iter();
+        let initial = variables.map(|v| v.initial_value).cycle();
+        let mut state: Vec<f64> = initial.take(n_points * n_states).collect();
+        let start = Start::of_fluxes(n_points, flux);
+        let mut outcomes = Outcomes::of(n_points);
+        let mut end = End::of_state(&mut state);
+        let batch = (&start, &mut end, &mut outcomes);
+        let ask = || self.instance.call(Request::InitialState, batch);
+        let answer =
+            current_call::calling(self.name, Doing::Start, n_points, Moment::default(), ask);
+        let Some((worst, message)) = answer else {
+            return Ok(state);
         };
-        let result =
-            current_call::calling(self.name, Doing::Start, n_points, Moment::default(), || {
-                self.instance.init_state(call)
-            });
-        match result {
-            None => Ok(state),
-            Some((worst, message)) => {
-                let outputs = [(&*state, Strided::rows(n_states), n_states)];
-                judge(worst, &status, &factor, message)
-                    .and_then(|_| finite(&outputs, n_points))
-                    .map_err(|failure| {
-                        let call = PointCall {
-                            request: Request::InitialState,
-                            time: 0.0,
-                            time_increment: 0.0,
-                            gradient: Vec::new(),
-                            gradient_end: Vec::new(),
-                            flux: flux.1.of_point(flux.0, failure.point, self.n_components()),
-                            state: Vec::new(),
-                            moment: Moment::default(),
-                            site: Site::default(),
-                        };
-                        failure.of_call(call)
-                    })?;
-                Ok(state)
-            }
-        }
+        let outputs = [(&*state, Strided::rows(n_states), n_states)];
+        judge(worst, &outcomes, message)
+            .and_then(|_| finite(&outputs, n_points))
+            .map_err(|failure| self.with_call(failure, Request::InitialState, &start))?;
+        Ok(state)
     }
 
     /// Response of the law at a point with this flux and no history, over an increment without
@@ -302,18 +282,12 @@ impl Law {
         let zero = vec![0.0; n];
         let state = self.initial_state(1, (flux, rows))?;
         let (mut flux_end, mut state_end) = (flux.to_vec(), state.clone());
-        let wanted = if operator == Operator::None { 0 } else { n * n };
-        let mut written = vec![0.0; wanted];
+        let mut written = vec![0.0; operator.n_entries(n)];
         let start = Start {
-            n_points: 1,
             gradient: (&zero, rows),
             gradient_end: (&zero, rows),
-            flux: (flux, rows),
             state: &state,
-            time: 0.0,
-            time_increment: 0.0,
-            moment: Moment::default(),
-            sites: &[],
+            ..Start::of_fluxes(1, (flux, rows))
         };
         let end = End {
             flux: (&mut flux_end, rows),
@@ -339,24 +313,7 @@ impl Law {
     ) -> Result<BatchSuccess, BatchFailure> {
         OUTCOMES
             .with_borrow_mut(|outcomes| self.integrate_with(outcomes, start, operator, end))
-            .map_err(|failure| {
-                let (point, n) = (failure.point, self.n_components());
-                let of_point =
-                    |(values, place): (&[f64], Strided)| place.of_point(values, point, n);
-                let rows = Strided::rows(self.n_states());
-                let call = PointCall {
-                    request: Request::Update(operator),
-                    time: start.time,
-                    time_increment: start.time_increment,
-                    gradient: of_point(start.gradient),
-                    gradient_end: of_point(start.gradient_end),
-                    flux: of_point(start.flux),
-                    state: rows.of_point(start.state, point, self.n_states()),
-                    moment: start.moment,
-                    site: start.sites.get(point).copied().unwrap_or_default(),
-                };
-                failure.of_call(call)
-            })
+            .map_err(|failure| self.with_call(failure, Request::Update(operator), start))
     }
 
     #[inline]
@@ -365,89 +322,61 @@ impl Law {
         outcomes: &mut Outcomes,
         start: &Start<'_>,
         operator: Operator,
-        end: End<'_>,
+        mut end: End<'_>,
     ) -> Result<BatchSuccess, BatchFailure> {
-        let n = self.n_components();
-        let (status, factor) = outcomes.unwritten(start.n_points);
-        let (flux, flux_place) = end.flux;
-        let call = Call {
-            request: raw::PILUM_REQ_FLUX
-                | match operator {
-                    Operator::None => 0,
-                    Operator::Consistent if self.formulation.tangent == Tangent::None => {
-                        raw::PILUM_REQ_ELASTIC
-                    }
-                    Operator::Consistent => raw::PILUM_REQ_TANGENT,
-                    Operator::Elastic => raw::PILUM_REQ_ELASTIC,
-                },
-            n_points: start.n_points,
-            n_components: n,
-            n_states: self.n_states(),
-            time: start.time,
-            time_increment: start.time_increment,
-            moment: start.moment,
-            sites: start.sites,
-            gradient0: Some(start.gradient),
-            gradient1: Some(start.gradient_end),
-            flux0: start.flux,
-            state0: start.state,
-            flux1: Some((&mut *flux, flux_place)),
-            state1: &mut *end.state,
-            tangent: &mut *end.operator,
-            status: &mut *status,
-            step_factor: &mut *factor,
+        let n_points = start.n_points;
+        outcomes.clear(n_points);
+        let asked = match operator {
+            Operator::Consistent if self.formulation.tangent == Tangent::None => Operator::Elastic,
+            operator => operator,
         };
-        let update = || self.instance.integrate(call);
-        let (worst, message) = current_call::calling(
-            self.name,
-            Doing::Update,
-            start.n_points,
-            start.moment,
-            update,
-        );
-        let success = judge(worst, status, factor, message)?;
-        let n_states = self.n_states();
-        let n_operator = if operator == Operator::None { 0 } else { n * n };
+        let batch = (start, &mut end, &mut *outcomes);
+        let update = || self.instance.call(Request::Update(asked), batch);
+        let answer =
+            current_call::calling(self.name, Doing::Update, n_points, start.moment, update);
+        // Without an answer the points say that the law broke down.
+        let (worst, message) = answer.unwrap_or_default();
+        let success = judge(worst, outcomes, message)?;
+        let (n, n_states) = (self.n_components(), self.n_states());
+        let n_operator = operator.n_entries(n);
         let outputs = [
-            (&*flux, flux_place, n),
+            (&*end.flux.0, end.flux.1, n),
             (&*end.state, Strided::rows(n_states), n_states),
             (&*end.operator, Strided::rows(n_operator), n_operator),
         ];
-        finite(&outputs, start.n_points)?;
+        finite(&outputs, n_points)?;
         Ok(success)
     }
-}
 
-/// Room for the outcomes of one call. Each thread keeps its own from call to call, so that a call
-/// allocates nothing once the largest batch has been seen.
-#[derive(Debug, Default)]
-struct Outcomes {
-    status: Vec<Status>,
-    factor: Vec<f64>,
+    /// A failure with what the law was asked at its point.
+    fn with_call(
+        &self,
+        failure: BatchFailure,
+        request: Request,
+        start: &Start<'_>,
+    ) -> BatchFailure {
+        let sizes = (self.n_components(), self.n_states());
+        let call = PointCall::of(request, start, failure.point, sizes);
+        BatchFailure {
+            call: Some(Box::new(call)),
+            ..failure
+        }
+    }
 }
 
 thread_local! {
+    /// Each thread keeps its own from call to call, so that a call allocates nothing once the largest batch has been
+    /// seen.
     static OUTCOMES: RefCell<Outcomes> = RefCell::default();
-}
-
-impl Outcomes {
-    /// Outcomes of this many points as they are before a law has written them.
-    fn unwritten(&mut self, n_points: usize) -> (&mut [Status], &mut [f64]) {
-        self.status.clear();
-        self.status.resize(n_points, raw::PILUM_E_INTERNAL);
-        self.factor.clear();
-        self.factor.resize(n_points, f64::NAN);
-        (&mut self.status, &mut self.factor)
-    }
 }
 
 /// Turns status codes into a verdict over the batch.
 fn judge(
     worst: Status,
-    status: &[Status],
-    factor: &[f64],
+    outcomes: &Outcomes,
     message: String,
 ) -> Result<BatchSuccess, BatchFailure> {
+    let Outcomes { status, factor } = outcomes;
     // `PILUM_OK` is 0.
     if status.iter().fold(worst, |all, s| all | s) == raw::PILUM_OK {
         return Ok(BatchSuccess::default());
@@ -459,38 +388,32 @@ fn judge(
         .unwrap_or(0);
     let at_point = status.get(point).copied().unwrap_or(worst);
     let code = abi::status::most_severe(worst, at_point);
-    match Outcome::from_code(code) {
-        Outcome::Ok => Ok(BatchSuccess::default()),
-        Outcome::Unreliable => Ok(BatchSuccess {
-            unreliable: Some((point, message)),
-        }),
-        Outcome::CutStep => {
-            // A law that leaves the factor alone leaves the choice to the host.
-            let smallest = factor
-                .iter()
-                .zip(status)
-                .filter(|(f, s)| **s == raw::PILUM_CUT_STEP && **f > 0.0 && **f < 1.0)
-                .map(|(f, _)| *f)
-                .fold(f64::INFINITY, f64::min);
-            let factor = if smallest.is_finite() { smallest } else { 0.25 };
-            Err(BatchFailure {
-                point,
-                outcome: Outcome::CutStep,
-                message,
-                factor: Some(factor),
-                claims_success: false,
-                call: None,
-            })
+    let outcome = match Outcome::from_code(code) {
+        Outcome::Ok => return Ok(BatchSuccess::default()),
+        Outcome::Unreliable => {
+            return Ok(BatchSuccess {
+                unreliable: Some((point, message)),
+            });
         }
-        outcome => Err(BatchFailure {
-            point,
-            outcome,
-            message,
-            factor: None,
-            claims_success: false,
-            call: None,
-        }),
-    }
+        outcome => outcome,
+    };
+    let smallest = || {
+        let asked = factor.iter().zip(status);
+        asked
+            .filter(|(f, s)| **s == raw::PILUM_CUT_STEP && **f > 0.0 && **f < 1.0)
+            .map(|(f, _)| *f)
+            .min_by(f64::total_cmp)
+            // A law that leaves the factor alone leaves the choice to the host.
+            .unwrap_or(0.25)
+    };
+    Err(BatchFailure {
+        point,
+        outcome,
+        message,
+        factor: (outcome == Outcome::CutStep).then(smallest),
+        claims_success: false,
+        call: None,
+    })
 }
 
 /// The error of a call that reports success wrongly.
@@ -509,8 +432,7 @@ fn finite(outputs: &[(&[f64], Strided, usize)], n_points: usize) -> Result<(), B
     }
     for point in 0..n_points {
         for (values, place, n) in outputs {
-            let first = place.offset + point * place.point;
-            if !(0..*n).all(|c| values[first + c * place.component].is_finite()) {
+            if !(0..*n).all(|c| values[place.at(point, c)].is_finite()) {
                 return Err(BatchFailure {
                     point,
                     outcome: Outcome::Numeric,

@@ -17,30 +17,27 @@ mod externals;
 mod instance;
 pub(crate) mod mfront;
 pub mod probe;
+pub(crate) mod routine;
 #[cfg(unix)]
 mod shared;
-pub(crate) mod udsm;
-pub(crate) mod umat;
 
 pub use describe::describe_memory;
-pub use instance::Strided;
 #[cfg(unix)]
 pub use shared::SharedMemory;
 
-use super::description::LawDescription;
-use super::library_bytes::Image;
-use super::process_state;
+use crate::description::LawDescription;
+use crate::process::library_bytes::Image;
+use crate::process::process_state;
 use abi::raw::{self, Host, Law, MagicBlock};
 use abi::version::{self, PLUGIN_SIZE_1_0};
 use describe::{describe, known};
-pub(crate) use instance::{Call, CallFailure, OwnedInstance};
-use instance::{NOTHING, NOWHERE};
+use instance::{NOTHING, NOWHERE, OwnedInstance};
 use probe::call_log::{self, KeptPhase, Phase};
 use std::ffi::CStr;
 use std::hint::black_box;
 use std::mem::size_of;
 use std::panic::resume_unwind;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 static HOST: HostBlock = HostBlock(Host {
@@ -60,10 +57,7 @@ struct HostBlock(Host);
 unsafe impl Sync for HostBlock {}
 
 /// The laws of one opened library.
-#[derive(Clone, Debug)]
-pub(crate) struct OpenLibrary {
-    pub(crate) laws: Vec<(LawDescription, LawHandle)>,
-}
+type Laws = Vec<(LawDescription, LawHandle)>;
 
 /// A law in its library's memory, and what this host knows of it.
 #[derive(Clone, Copy, Debug)]
@@ -85,25 +79,25 @@ static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 /// are never unloaded, and the same bytes loaded again for each [`Opener`](crate::Opener) would
 /// only pile up.
 /// Whether a library may be used is its opener's decision, made before it is looked for here.
-static LOADED: Mutex<Vec<(String, OpenLibrary)>> = Mutex::new(Vec::new());
+static LOADED: Mutex<Vec<(String, Laws)>> = Mutex::new(Vec::new());
 
 /// Opens a library, shakes hands and copies its description. It is opened from the bytes that were
 /// hashed where the system allows it.
 ///
 /// # Errors
 /// The defect of the library, in words.
-pub(crate) fn open(path: &Path, image: Image) -> Result<OpenLibrary, String> {
+pub(crate) fn open(path: &Path, image: Image) -> Result<Laws, String> {
     let mut loaded = LOADED.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some((_, library)) = loaded.iter().find(|(sha256, _)| *sha256 == image.sha256) {
-        return Ok(library.clone());
+    if let Some((_, laws)) = loaded.iter().find(|(sha256, _)| *sha256 == image.sha256) {
+        return Ok(laws.clone());
     }
     let sha256 = image.sha256.clone();
-    let library = load_and_describe(path, image)?;
-    loaded.push((sha256, library.clone()));
-    Ok(library)
+    let laws = load_and_describe(path, image)?;
+    loaded.push((sha256, laws.clone()));
+    Ok(laws)
 }
 
-fn load_and_describe(path: &Path, image: Image) -> Result<OpenLibrary, String> {
+fn load_and_describe(path: &Path, image: Image) -> Result<Laws, String> {
     let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let begin = |phase| {
         call_log::keep_phase(KeptPhase::new(phase, false)).map_err(|error| error.to_string())
@@ -111,7 +105,7 @@ fn load_and_describe(path: &Path, image: Image) -> Result<OpenLibrary, String> {
     begin(Phase::Load)?;
     // SAFETY: running the library's initialisers is what loading means; the user named it.
     let library: &'static libloading::Library =
-        Box::leak(Box::new(unsafe { load_image(path, image) }?));
+        Box::leak(Box::new(unsafe { load_image(path, image, false) }?));
     // SAFETY: contract, "Handshake": `pilum_magic` is a data symbol of this type for ever.
     let magic = unsafe { library.get::<*const MagicBlock>(b"pilum_magic\0") }
         .map_err(|_| "it has no symbol `pilum_magic`: this is no Pilum law library".to_owned())?;
@@ -141,14 +135,20 @@ fn load_and_describe(path: &Path, image: Image) -> Result<OpenLibrary, String> {
 
 /// Loads the hashed bytes. If that fails (a library that looks for others next to itself, a system
 /// that executes nothing from memory), the file is loaded, provided it is unchanged. The loader
-/// runs nothing of a library it cannot load.
+/// runs nothing of a library it cannot load. An image that `is_private` shares no variables with another
+/// one: the file itself gives the same image every time, so that a second one of it is refused.
 ///
 /// # Safety
 /// The library's initialisers may be run.
-unsafe fn load_image(path: &Path, image: Image) -> Result<libloading::Library, String> {
+unsafe fn load_image(
+    path: &Path,
+    image: Image,
+    is_private: bool,
+) -> Result<libloading::Library, String> {
+    static IN_PLACE: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
     if let Some(sealed) = image.sealed_path() {
         // SAFETY: passed on to the caller.
-        if let Ok(library) = unsafe { load(&sealed, path) } {
+        if let Ok(library) = unsafe { load(&sealed, path, is_private) } {
             image.keep();
             return Ok(library);
         }
@@ -156,25 +156,55 @@ unsafe fn load_image(path: &Path, image: Image) -> Result<libloading::Library, S
             return Err("it was changed while it was opened".to_owned());
         }
     }
+    let mut in_place = IN_PLACE.lock().unwrap_or_else(PoisonError::into_inner);
+    if is_private && in_place.iter().any(|opened| opened == path) {
+        return Err(
+            "another material uses it already, and this system cannot open it a second time with \
+             variables of its own; without `in_process` each material has a process of its own"
+                .to_owned(),
+        );
+    }
     // SAFETY: passed on to the caller.
-    unsafe { load(path, path) }.map_err(|error| {
+    let library = unsafe { load(path, path, is_private) }.map_err(|error| {
         let why = std::error::Error::source(&error).map_or(String::new(), |why| format!(": {why}"));
         format!("it cannot be loaded: {error}{why}")
-    })
+    })?;
+    if is_private {
+        in_place.push(path.to_owned());
+    }
+    Ok(library)
 }
 
+/// Loads a file of the library at `path`. One that `is_private` finds its own symbols first: a routine that brings its
+/// own `sprind` uses that one, and the program's is there for the others.
 #[cfg(unix)]
-unsafe fn load(file: &Path, path: &Path) -> Result<libloading::Library, libloading::Error> {
+unsafe fn load(
+    file: &Path,
+    path: &Path,
+    is_private: bool,
+) -> Result<libloading::Library, libloading::Error> {
     use libloading::os::unix::{Library, RTLD_LOCAL, RTLD_NOW};
+    let mut flags = RTLD_NOW | RTLD_LOCAL;
+    if is_private {
+        abaqus::keep();
+        if cfg!(all(target_os = "linux", target_env = "gnu")) {
+            const RTLD_DEEPBIND: std::ffi::c_int = 8;
+            flags |= RTLD_DEEPBIND;
+        }
+    }
     // SAFETY: passed on to the caller.
-    apart(path, || unsafe {
-        Library::open(Some(file), RTLD_NOW | RTLD_LOCAL)
-    })
-    .map(Into::into)
+    apart(path, || unsafe { Library::open(Some(file), flags) }).map(Into::into)
 }
 
 #[cfg(not(unix))]
-unsafe fn load(file: &Path, path: &Path) -> Result<libloading::Library, libloading::Error> {
+unsafe fn load(
+    file: &Path,
+    path: &Path,
+    is_private: bool,
+) -> Result<libloading::Library, libloading::Error> {
+    if is_private {
+        abaqus::keep();
+    }
     // SAFETY: passed on to the caller.
     apart(path, || unsafe { libloading::Library::new(file) })
 }

@@ -11,16 +11,13 @@
 //!
 //! and the operator is that of the solid, rows and columns 22 and 12, divided by d.
 
+use crate::call::{Batch, End, Operator, Request, Start, Strided};
 use crate::description::{FormulationDescription, InternalVariable, LawDescription};
-use crate::law::LawInstance;
-use crate::library::{Call, CallFailure, Strided};
-use crate::open_library::Origin;
-use crate::{Library, LoadedLaw};
+use crate::instance::{Answer, Instance, Source};
 use abi::Hypothesis;
-use abi::raw::{self, Status};
-use serde::Deserialize;
+use abi::raw;
+use serde::{Deserialize, Serialize};
 use std::cell::RefCell;
-use std::fmt;
 use std::sync::Arc;
 
 /// Places of the components that an interface has, n and t, among those of a solid.
@@ -38,7 +35,7 @@ const LEAST: f64 = 1e-9;
 const USUAL: [f64; 2] = [1e-4, 0.5];
 
 /// A zone of an interface that a law of solids fills.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ShearZone {
     /// Thickness, m; at least 1e-9.
@@ -98,17 +95,6 @@ impl ShearZone {
     }
 }
 
-/// As a file has it; numbers read back to the same bits.
-impl fmt::Display for ShearZone {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (thickness, ratio) = (self.thickness, self.lateral_ratio);
-        write!(
-            f,
-            "{{ thickness = {thickness:?}, lateral_ratio = {ratio:?} }}"
-        )
-    }
-}
-
 /// Hypothesis in which a zone evaluates its law: all strains along the zone and out of plane are 0, so that the
 /// hypotheses differ by their components only.
 fn hypothesis(law: &LawDescription) -> Option<Hypothesis> {
@@ -140,26 +126,29 @@ fn variables(hypothesis: Hypothesis) -> impl Iterator<Item = InternalVariable> {
     })
 }
 
-impl LoadedLaw {
-    /// The law of an interface that this law of solids makes in a zone. It has its id, parameters
-    /// and internal variables, and the zone's stresses.
+impl ShearZone {
+    /// The law of an interface that a law of solids makes in this zone. It has its id, parameters and internal variables,
+    /// and the zone's stresses.
     ///
     /// # Errors
     /// The law is not for solids, or the zone does not fit; in words.
-    pub fn in_shear_zone(&self, zone: ShearZone) -> Result<Self, String> {
-        if let Some((_, why)) = zone.fault() {
+    pub(crate) fn filled_with(
+        self,
+        law: &LawDescription,
+        source: &Arc<dyn Source>,
+    ) -> Result<(LawDescription, Arc<dyn Source>), String> {
+        if let Some((_, why)) = self.fault() {
             return Err(why);
         }
-        let law = self.description();
         let id = &law.id;
-        let Some(solid) = hypothesis(law) else {
+        let solid = hypothesis(law).and_then(|h| Some((h, law.formulation(h)?)));
+        let Some((solid, formulation)) = solid else {
             return Err(format!(
                 "a shear zone is made from a law of solids; law `{id}` is made for {}",
                 law.hypotheses()
             ));
         };
-        let inner = law.formulation(solid).into_iter();
-        let mut inner = inner.flat_map(|formulation| &formulation.internal_variables);
+        let mut inner = formulation.internal_variables.iter();
         let own: Vec<String> = variables(solid).map(|variable| variable.id).collect();
         let taken = inner.find_map(|variable| own.iter().find(|own| **own == variable.id));
         if let Some(taken) = taken {
@@ -167,54 +156,67 @@ impl LoadedLaw {
                 "law `{id}` has an internal variable `{taken}`, as the zone calls one of its own stresses"
             ));
         }
-        let formulation = law.formulation(solid).into_iter();
-        let formulation = formulation.map(|solid_formulation| FormulationDescription {
+        let inner = formulation.internal_variables.iter().cloned();
+        let of_interface = FormulationDescription {
             hypothesis: Hypothesis::Interface2d.name(),
             linear: false,
             local_axes: false,
-            internal_variables: solid_formulation
-                .internal_variables
-                .iter()
-                .cloned()
-                .chain(variables(solid))
-                .collect(),
-            ..solid_formulation.clone()
-        });
+            internal_variables: inner.chain(variables(solid)).collect(),
+            ..formulation.clone()
+        };
         let description = LawDescription {
             name: format!("Shear zone of {}", law.name),
-            formulations: formulation.collect(),
+            formulations: vec![of_interface],
             ..law.clone()
         };
-        let own = self.library();
-        Ok(Self {
-            number: 0,
-            library: Arc::new(Library {
-                path: own.path.clone(),
-                sha256: own.sha256.clone(),
-                warnings: own.warnings.clone(),
-                stamp: own.stamp,
-                laws: vec![(description, Origin::Zone(zone, Box::new(self.clone())))],
-                foreign: own.foreign.clone(),
-                sidecar: own.sidecar.clone(),
-                call_limit: own.call_limit,
-            }),
-        })
+        let filled = FilledZone {
+            zone: self,
+            solid,
+            formulation: formulation.clone(),
+            source: Arc::clone(source),
+        };
+        Ok((description, Arc::new(filled)))
+    }
+}
+
+/// A zone with its law of solids.
+#[derive(Debug)]
+struct FilledZone {
+    zone: ShearZone,
+    /// What the law is called under.
+    solid: Hypothesis,
+    formulation: FormulationDescription,
+    source: Arc<dyn Source>,
+}
+
+impl Source for FilledZone {
+    fn create(
+        &self,
+        _: Hypothesis,
+        _: &FormulationDescription,
+        parameters: &[f64],
+    ) -> Result<Box<dyn Instance>, Answer> {
+        let law = self
+            .source
+            .create(self.solid, &self.formulation, parameters)?;
+        Ok(Box::new(ZoneInstance {
+            zone: self.zone,
+            law,
+            n: self.solid.n_components(),
+            n_states: self.formulation.internal_variables.len(),
+        }))
     }
 
-    /// The zone that it fills, if it is the law of one.
-    pub fn shear_zone(&self) -> Option<ShearZone> {
-        match &self.library.laws[self.number].1 {
-            Origin::Zone(zone, _) => Some(*zone),
-            _ => None,
-        }
+    fn is_called_here(&self) -> bool {
+        false
     }
 }
 
 /// A zone whose law has its parameters.
 #[derive(Debug)]
-pub(crate) struct ZoneInstance {
+struct ZoneInstance {
     zone: ShearZone,
-    law: Box<LawInstance>,
+    law: Box<dyn Instance>,
     /// Components of the law.
     n: usize,
     /// Internal variables of the law.
@@ -245,101 +247,85 @@ fn unwritten(values: &mut Vec<f64>, n: usize) -> &mut [f64] {
     values
 }
 
-impl ZoneInstance {
-    /// Fixes the parameters of the law.
-    ///
-    /// # Errors
-    /// Those of the law.
-    pub(crate) fn create(
-        zone: ShearZone,
-        law: &LoadedLaw,
-        parameters: &[f64],
-    ) -> Result<Self, CallFailure> {
-        let description = law.description();
-        let solid = hypothesis(description).and_then(|h| Some((h, description.formulation(h)?)));
-        let Some((hypothesis, formulation)) = solid else {
-            let message = "it is no law of solids".to_owned();
-            return Err((raw::PILUM_E_INTERNAL, message));
-        };
-        Ok(Self {
-            zone,
-            law: Box::new(law.instance(hypothesis, parameters)?),
-            n: hypothesis.n_components(),
-            n_states: formulation.internal_variables.len(),
+impl Instance for ZoneInstance {
+    fn call(&self, request: Request, batch: Batch<'_, '_>) -> Option<Answer> {
+        ROOM.with_borrow_mut(|room| match request {
+            Request::InitialState => Some(self.init_state(room, batch)),
+            Request::Update(operator) => self.integrate(room, operator, batch),
         })
     }
 
-    /// Arguments that the law's routine has overwritten, those that were not told before.
-    pub(crate) fn take_overwritten(&self) -> Vec<String> {
+    fn take_overwritten(&self) -> Vec<String> {
         self.law.take_overwritten()
     }
+}
 
+impl ZoneInstance {
     /// Places of the zone's own variables among the components.
     fn own(&self) -> impl Iterator<Item = usize> {
         let n = self.n;
         OF_ZONE.into_iter().filter(move |place| *place < n)
     }
 
-    /// Initial internal variables: those of the law for the whole stress, and that stress.
-    pub(crate) fn init_state(&self, call: Call<'_>) -> (Status, String) {
-        ROOM.with_borrow_mut(|room| self.init_state_in(room, call))
+    /// Number of internal variables of the law and of the zone.
+    fn n_all(&self) -> usize {
+        self.n_states + self.own().count()
     }
 
-    fn init_state_in(&self, room: &mut Room, call: Call<'_>) -> (Status, String) {
-        let (n, n_states, points) = (self.n, self.n_states, call.n_points);
+    /// Internal variables of the law for the whole stress, and that stress.
+    fn init_state(&self, room: &mut Room, (start, end, outcomes): Batch<'_, '_>) -> Answer {
+        let (n, n_states, points) = (self.n, self.n_states, start.n_points);
+        let n_all = self.n_all();
         let stress = unwritten(&mut room.stress, points * n);
         let state = unwritten(&mut room.state_end, points * n_states);
         for (i, stress) in stress.chunks_exact_mut(n).enumerate() {
             stress.fill(0.0);
             for (c, place) in OF_INTERFACE.into_iter().enumerate() {
-                stress[place] = value(call.flux0, i, c);
+                stress[place] = value(start.flux, i, c);
             }
             for place in LATERAL {
                 stress[place] = self.zone.lateral_ratio * stress[OF_INTERFACE[0]];
             }
-            let whole = &mut call.state1[i * call.n_states..][..call.n_states];
-            let (law, own) = whole.split_at_mut(n_states);
+            let (law, own) = end.state[i * n_all..][..n_all].split_at_mut(n_states);
             state[i * n_states..][..n_states].copy_from_slice(law);
             for (own, place) in own.iter_mut().zip(self.own()) {
                 *own = stress[place];
             }
         }
-        let inner = Call {
-            n_components: n,
-            n_states,
-            flux0: (stress, Strided::rows(n)),
-            state1: &mut *state,
-            status: &mut *call.status,
-            step_factor: &mut *call.step_factor,
-            ..call
+        let inner = Start {
+            flux: (stress, Strided::rows(n)),
+            ..*start
         };
-        let answer = self.law.init_state(inner);
+        let mut inner_end = End::of_state(&mut *state);
+        let batch = (&inner, &mut inner_end, &mut *outcomes);
+        let answer = self.law.call(Request::InitialState, batch);
         let Some(answer) = answer else {
-            call.status[..points].fill(raw::PILUM_OK);
+            outcomes.status.fill(raw::PILUM_OK);
             return (raw::PILUM_OK, String::new());
         };
         for i in 0..points {
-            let law = &mut call.state1[i * call.n_states..][..n_states];
+            let law = &mut end.state[i * n_all..][..n_states];
             law.copy_from_slice(&state[i * n_states..][..n_states]);
         }
         answer
     }
 
-    /// Carries the points over the increment. Returns the most severe status and a message.
-    pub(crate) fn integrate(&self, call: Call<'_>) -> (Status, String) {
-        ROOM.with_borrow_mut(|room| self.integrate_in(room, call))
-    }
-
-    fn integrate_in(&self, room: &mut Room, call: Call<'_>) -> (Status, String) {
-        let (n, n_states, points) = (self.n, self.n_states, call.n_points);
-        let n_all = call.n_states;
-        let wants_operator = call.request & (raw::PILUM_REQ_TANGENT | raw::PILUM_REQ_ELASTIC) != 0;
-        let n_operator = if wants_operator { n * n } else { 0 };
+    fn integrate(
+        &self,
+        room: &mut Room,
+        operator: Operator,
+        (start, end, outcomes): Batch<'_, '_>,
+    ) -> Option<Answer> {
+        let (n, n_states, points) = (self.n, self.n_states, start.n_points);
+        let n_all = self.n_all();
+        let rows = Strided::rows(n);
         let strain = unwritten(&mut room.strain, points * n);
         let strain_end = unwritten(&mut room.strain_end, points * n);
-        for (strain, jump) in [(&mut *strain, call.gradient0), (strain_end, call.gradient1)] {
+        for (strain, jump) in [
+            (&mut *strain, start.gradient),
+            (&mut *strain_end, start.gradient_end),
+        ] {
             strain.fill(0.0);
-            let Some(jump) = jump else { continue };
             for (i, strain) in strain.chunks_exact_mut(n).enumerate() {
                 for (c, place) in OF_INTERFACE.into_iter().enumerate() {
                     strain[place] = value(jump, i, c) / self.zone.thickness;
@@ -349,10 +335,10 @@ impl ZoneInstance {
         let stress = unwritten(&mut room.stress, points * n);
         let state = unwritten(&mut room.state, points * n_states);
         for (i, stress) in stress.chunks_exact_mut(n).enumerate() {
-            let (law, own) = call.state0[i * n_all..][..n_all].split_at(n_states);
+            let (law, own) = start.state[i * n_all..][..n_all].split_at(n_states);
             state[i * n_states..][..n_states].copy_from_slice(law);
             for (c, place) in OF_INTERFACE.into_iter().enumerate() {
-                stress[place] = value(call.flux0, i, c);
+                stress[place] = value(start.flux, i, c);
             }
             for (own, place) in own.iter().zip(self.own()) {
                 stress[place] = *own;
@@ -360,52 +346,43 @@ impl ZoneInstance {
         }
         let stress_end = unwritten(&mut room.stress_end, points * n);
         let state_end = unwritten(&mut room.state_end, points * n_states);
-        let operator = unwritten(&mut room.operator, points * n_operator);
-        let rows = Strided::rows(n);
-        let answer = self.law.integrate(Call {
-            request: call.request,
-            n_points: points,
-            n_components: n,
-            n_states,
-            time: call.time,
-            time_increment: call.time_increment,
-            moment: call.moment,
-            sites: call.sites,
-            gradient0: Some((&room.strain, rows)),
-            gradient1: Some((&room.strain_end, rows)),
-            flux0: (stress, rows),
-            state0: state,
-            flux1: Some((&mut *stress_end, rows)),
-            state1: &mut *state_end,
-            tangent: &mut *operator,
-            status: call.status,
-            step_factor: call.step_factor,
-        });
+        let matrix = unwritten(&mut room.operator, points * operator.n_entries(n));
+        let inner = Start {
+            gradient: (strain, rows),
+            gradient_end: (strain_end, rows),
+            flux: (stress, rows),
+            state,
+            ..*start
+        };
+        let mut inner_end = End {
+            flux: (&mut *stress_end, rows),
+            state: &mut *state_end,
+            operator: &mut *matrix,
+        };
+        let batch = (&inner, &mut inner_end, outcomes);
+        let answer = self.law.call(Request::Update(operator), batch);
+        let (flux, place) = &mut end.flux;
         for i in 0..points {
             let stress_end = &stress_end[i * n..][..n];
-            let (law, own) = call.state1[i * n_all..][..n_all].split_at_mut(n_states);
+            let (law, own) = end.state[i * n_all..][..n_all].split_at_mut(n_states);
             law.copy_from_slice(&state_end[i * n_states..][..n_states]);
             for (own, place) in own.iter_mut().zip(self.own()) {
                 *own = stress_end[place];
             }
-        }
-        if let Some((flux, place)) = call.flux1 {
-            for i in 0..points {
-                let first = place.offset + i * place.point;
-                for (c, of_solid) in OF_INTERFACE.into_iter().enumerate() {
-                    flux[first + c * place.component] = stress_end[i * n + of_solid];
-                }
+            for (c, of_solid) in OF_INTERFACE.into_iter().enumerate() {
+                flux[place.at(i, c)] = stress_end[of_solid];
             }
         }
-        let entries = call.tangent.chunks_exact_mut(OF_INTERFACE.len().pow(2));
-        if wants_operator {
-            for (entries, solid) in entries.zip(operator.chunks_exact(n * n)) {
-                let places = OF_INTERFACE
-                    .into_iter()
-                    .flat_map(|row| OF_INTERFACE.map(|column| row * n + column));
-                for (entry, of_solid) in entries.iter_mut().zip(places) {
-                    *entry = solid[of_solid] / self.zone.thickness;
-                }
+        if operator == Operator::None {
+            return answer;
+        }
+        let entries = end.operator.chunks_exact_mut(OF_INTERFACE.len().pow(2));
+        for (entries, solid) in entries.zip(matrix.chunks_exact(n * n)) {
+            let places = OF_INTERFACE
+                .into_iter()
+                .flat_map(|row| OF_INTERFACE.map(|column| row * n + column));
+            for (entry, of_solid) in entries.iter_mut().zip(places) {
+                *entry = solid[of_solid] / self.zone.thickness;
             }
         }
         answer
@@ -414,5 +391,5 @@ impl ZoneInstance {
 
 /// Component `c` of a point.
 fn value((values, place): (&[f64], Strided), point: usize, c: usize) -> f64 {
-    values[place.offset + point * place.point + c * place.component]
+    values[place.at(point, c)]
 }

@@ -1,118 +1,16 @@
-//! Libraries that are not known yet are tried in a child process first: what crashes, hangs or eats
-//! all memory does so there.
-//!
-//! Libraries that passed are remembered by SHA-256 and program version, so that each is tried once.
-//! Others are tried again every time.
+//! The child process that tries a library before it is opened for the first time (`process/vetting.rs`).
 
-use super::{End, Law, LoadedLaw, Moment, Opener, Operator, ParameterDescription, Start, Strided};
-use crate::Error;
-use crate::child::{self, Ending, Work};
+use crate::process::child;
+use crate::process::vetting::{self, MARK, PASSED, REFUSED};
+use crate::{End, Error, Law, LoadedLaw, Opener, Operator, ParameterDescription, Start, Strided};
 use abi::Hypothesis;
-use std::ffi::OsString;
-use std::io::{ErrorKind, Write};
-use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::io::Write;
+use std::path::Path;
 
 /// The hidden command of the child.
-pub const COMMAND: &str = "probe-library";
-/// How long the child may take.
-const TIME: Duration = Duration::from_secs(5);
-/// How much address space it may take, in bytes.
-const MEMORY: u64 = 4 << 30;
-/// In front of what the child says, since libraries may print too.
-const MARK: &str = "pilum-probe: ";
-/// Its last words where the library did all it was asked for.
-const PASSED: &str = "passed";
-/// Its last words where the library was refused in an orderly way.
-const REFUSED: &str = "refused";
+pub const COMMAND: &str = vetting::COMMAND;
 /// Points of a call.
 const N_POINTS: usize = 3;
-
-/// Tries a library in a child process, unless that was done. Orderly refusals are left to this
-/// process, which finds the same.
-///
-/// # Errors
-/// [`Error::Library`]: what the library did in the child. [`text::Error::Usage`]: there is not the memory for one.
-pub(crate) fn vet(path: &Path, sha256: &str) -> Result<(), Error> {
-    let verdict = verdict_path(sha256);
-    if verdict.as_ref().is_some_and(|file| file.is_file()) {
-        return Ok(());
-    }
-    let work = Work {
-        arguments: vec![
-            OsString::from(COMMAND),
-            path.as_os_str().to_owned(),
-            OsString::from(sha256),
-        ],
-        folder: None,
-        variables: Vec::new(),
-        time: TIME,
-        memory: Some(MEMORY),
-    };
-    let outcome = child::run(&work).map_err(|why| {
-        let library = path.display();
-        if why.kind() == ErrorKind::OutOfMemory {
-            let message = format!("not enough memory to try library {library} in a child process");
-            return text::Error::Usage(message).into();
-        }
-        Error::library(format!(
-            "library {library} cannot be tried in a child process: {why}"
-        ))
-    })?;
-    let output = String::from_utf8_lossy(&outcome.stdout);
-    let mut marked = output.lines().filter_map(|line| line.split_once(MARK));
-    let last = marked.next_back().map_or("loading it", |(_, said)| said);
-    match (outcome.ending, last) {
-        (Ending::Exited(0), PASSED) => {
-            if let Some(file) = verdict {
-                remember(&file);
-            }
-            Ok(())
-        }
-        (Ending::Exited(0), REFUSED) => Ok(()),
-        (ending, doing) => Err(Error::Library {
-            message: format!(
-                "library {} was tried in a child process and did not survive: {ending}, while \
-                 {doing}",
-                path.display()
-            ),
-            hint: Some(
-                "`pilum check` finds out more; `--no-probe` opens it all the same, `--isolate` \
-                 calls its laws in a process of their own"
-                    .to_owned(),
-            ),
-        }),
-    }
-}
-
-/// The file that stands for a library that passed. `None` where there is no place for it.
-fn verdict_path(sha256: &str) -> Option<PathBuf> {
-    let set = |name| {
-        std::env::var_os(name)
-            .map(PathBuf::from)
-            .filter(|path| path.is_absolute())
-    };
-    let home = || {
-        if cfg!(windows) {
-            set("LOCALAPPDATA")
-        } else if cfg!(target_os = "macos") {
-            set("HOME").map(|home| home.join("Library/Caches"))
-        } else {
-            set("HOME").map(|home| home.join(".cache"))
-        }
-    };
-    let cache = set("XDG_CACHE_HOME").or_else(home)?;
-    let version = env!("CARGO_PKG_VERSION");
-    Some(cache.join("pilum/probed").join(version).join(sha256))
-}
-
-/// A verdict that cannot be kept costs time, and nothing else.
-fn remember(file: &Path) {
-    if let Some(folder) = file.parent() {
-        let _ = std::fs::create_dir_all(folder);
-    }
-    let _ = std::fs::write(file, "");
-}
 
 /// The child opens the library, reads its description, and calls each law a few times.
 ///
@@ -127,11 +25,8 @@ pub fn probe(path: &Path, sha256: &str, out: &mut dyn Write) -> Result<(), Error
     };
     say("opening it").map_err(speechless)?;
     let same = |found: &str| {
-        if found == sha256 {
-            Ok(())
-        } else {
-            Err(Error::library("it was changed"))
-        }
+        let is_same = (found == sha256).then_some(());
+        is_same.ok_or_else(|| Error::library("it was changed"))
     };
     let Ok(library) = Opener::default().open_if(path, same) else {
         return say(REFUSED).map_err(speechless);
@@ -180,15 +75,11 @@ fn step(law: &Law, operator: Operator, size: f64, flux: &[f64], state: &[f64]) {
     let mut state_end = state.to_vec();
     let mut operators = vec![0.0; n * n * N_POINTS];
     let start = Start {
-        n_points: N_POINTS,
         gradient: (&zero, rows),
         gradient_end: (&moved, rows),
-        flux: (flux, rows),
         state,
-        time: 0.0,
         time_increment: 1.0,
-        moment: Moment::default(),
-        sites: &[],
+        ..Start::of_fluxes(N_POINTS, (flux, rows))
     };
     let end = End {
         flux: (&mut flux_end, rows),

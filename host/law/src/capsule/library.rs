@@ -1,17 +1,19 @@
 //! Crashes of a library outside calls of its laws: loading, handshake, entry,
 //! description, `destroy` of null, the end of the process.
 
-use super::{Made, OutcomePart, place, text};
+use super::{OutcomePart, VERSION, place};
 use crate::Error;
-use crate::adapter::{Adapter, Externals, Foreign, Order};
+use crate::description::is_false;
+use crate::foreign::Foreign;
 use crate::library::probe::call_log::{KeptPhase, Phase};
 use indexmap::IndexMap;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-use text::{Source, toml_error};
+use text::Source;
+use toml::de::DeTable;
 
 /// A phase of a library that failed, and where it comes from.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LibraryCapsule {
     version: u32,
@@ -25,7 +27,7 @@ pub struct LibraryCapsule {
 }
 
 /// The library of a capsule.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LibraryPart {
     /// Its file.
@@ -35,52 +37,34 @@ pub struct LibraryPart {
     /// The action on it.
     pub phase: Phase,
     /// It is loaded from its file and not from the bytes that were hashed.
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "is_false")]
     pub from_file: bool,
     /// The law whose function is called.
     pub law: Option<String>,
-    /// The program that the library is made for, if not for the contract.
-    pub adapter: Option<Adapter>,
-    /// What describes it.
-    pub sidecar: Option<PathBuf>,
-    /// What becomes of routines that nobody supplies.
-    pub externals: Option<Externals>,
-    /// How the routine leaves its stiffness.
-    pub tangent_order: Option<Order>,
+    /// The library as a file would name it, if it keeps no contract.
+    foreign: Option<Foreign>,
 }
 
 impl LibraryPart {
-    fn made(&self) -> Made {
-        Made {
-            adapter: self.adapter,
-            sidecar: self.sidecar.clone(),
-            externals: self.externals,
-            tangent_order: self.tangent_order,
-        }
-    }
-
     /// The library as a file would name it, called in this process, if it keeps no contract.
     pub fn foreign(&self) -> Option<Foreign> {
-        self.made().foreign(&self.path)
+        let foreign = self.foreign.as_ref();
+        foreign.map(|foreign| foreign.of_capsule(&self.path))
     }
 }
 
 impl LibraryCapsule {
     /// The capsule of a phase of this library, with an outcome to be filled in.
     pub fn new(path: &Path, sha256: String, kept: KeptPhase, foreign: Option<&Foreign>) -> Self {
-        let made = Made::of(foreign);
         Self {
-            version: 1,
+            version: VERSION,
             library: LibraryPart {
-                path: path.to_owned(),
+                path: path.to_string_lossy().into_owned().into(),
                 sha256,
                 phase: kept.phase,
                 from_file: kept.from_file,
                 law: kept.law,
-                adapter: made.adapter,
-                sidecar: made.sidecar,
-                externals: made.externals,
-                tangent_order: made.tangent_order,
+                foreign: foreign.map(|foreign| foreign.of_capsule(path)),
             },
             origin: IndexMap::new(),
             outcome: OutcomePart {
@@ -97,14 +81,13 @@ impl LibraryCapsule {
     /// At the place that does not fit.
     #[inline]
     pub fn of_source(source: &Source) -> Result<Option<Self>, Error> {
-        // A capsule of a call may have many points, and is not read twice.
-        let mut lines = source.text().lines();
-        if !lines.any(|line| line.trim() == "[library]") {
+        let is_of_library =
+            DeTable::parse(source.text()).is_ok_and(|root| root.get_ref().contains_key("library"));
+        if !is_of_library {
             return Ok(None);
         }
-        let capsule: Self =
-            toml::from_str(source.text()).map_err(|why| toml_error(source, &why))?;
-        if capsule.version != 1 {
+        let capsule: Self = text::parse_any_numbers(source)?;
+        if capsule.version != VERSION {
             let message = format!("this is a capsule of version {}", capsule.version);
             let at = place(source.text(), &["version"]);
             return Err(source.error(at, message).into());
@@ -120,33 +103,10 @@ impl LibraryCapsule {
 
 impl std::fmt::Display for LibraryCapsule {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let library = &self.library;
-        writeln!(
+        let text = toml::to_string(self).map_err(|_| std::fmt::Error)?;
+        write!(
             f,
-            "# A library that failed where no law is called. `pilum replay` does the same once more.\n\
-             version = {}\n\n[library]\npath = {}\nsha256 = {}\nphase = {}",
-            self.version,
-            text(&library.path.to_string_lossy()),
-            text(&library.sha256),
-            text(library.phase.name())
-        )?;
-        if library.from_file {
-            writeln!(f, "from_file = true")?;
-        }
-        if let Some(law) = &library.law {
-            writeln!(f, "law = {}", text(law))?;
-        }
-        write!(f, "{}", library.made())?;
-        writeln!(f, "\n[where]")?;
-        for (key, value) in &self.origin {
-            writeln!(f, "{key} = {value}")?;
-        }
-        let outcome = &self.outcome;
-        writeln!(
-            f,
-            "\n[outcome]\nstatus = {}\nmessage = {}",
-            text(&outcome.status),
-            text(&outcome.message)
+            "# A library that failed where no law is called. `pilum replay` does the same once more.\n{text}"
         )
     }
 }

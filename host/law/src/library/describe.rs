@@ -1,9 +1,10 @@
 //! Description of the laws of a library, copied out of its memory: nothing is believed but that structs, tables and texts
 //! are as long as they say.
 
-use super::{LawHandle, OpenLibrary};
+use super::{LawHandle, Laws};
 use crate::description::{
-    Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription, Tangent,
+    Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription,
+    Tangent, is_identifier, words,
 };
 use abi::Hypothesis;
 use abi::raw::{self, Formulation, Law, Parameter, Plugin, Variable};
@@ -123,11 +124,7 @@ pub(super) fn text(p: *const c_char, what: &str, allowance: &Allowance) -> Resul
 
 fn identifier(p: *const c_char, what: &str, allowance: &Allowance) -> Result<String, String> {
     let id = text(p, what, allowance)?;
-    let well_formed = id.starts_with(|c: char| c.is_ascii_lowercase())
-        && id
-            .chars()
-            .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
-    if well_formed {
+    if is_identifier(&id) {
         Ok(id)
     } else {
         Err(format!("the id `{id}` of {what} is malformed"))
@@ -152,11 +149,11 @@ fn unique<'a>(ids: impl Iterator<Item = &'a str>, what: &str) -> Result<(), Stri
 /// # Safety
 /// Structs, tables and texts that it points to, directly or not, are as long as they say.
 pub unsafe fn describe_memory(plugin: &Plugin) -> Result<Vec<LawDescription>, String> {
-    let laws = describe(plugin)?.laws;
+    let laws = describe(plugin)?;
     Ok(laws.into_iter().map(|(law, _)| law).collect())
 }
 
-pub(super) fn describe(plugin: &Plugin) -> Result<OpenLibrary, String> {
+pub(super) fn describe(plugin: &Plugin) -> Result<Laws, String> {
     if plugin.n_laws == 0 || plugin.n_laws > LONGEST_TABLE || plugin.law.is_null() {
         return Err(format!("it declares {} laws", plugin.n_laws));
     }
@@ -177,7 +174,7 @@ pub(super) fn describe(plugin: &Plugin) -> Result<OpenLibrary, String> {
         })
         .collect::<Result<Vec<_>, String>>()?;
     unique(laws.iter().map(|(law, _)| law.id.as_str()), "law")?;
-    Ok(OpenLibrary { laws })
+    Ok(laws)
 }
 
 fn describe_law(law: &Law, allowance: &Allowance) -> Result<LawDescription, String> {
@@ -266,12 +263,7 @@ fn describe_parameter(
         default,
         optional: p.flags & raw::PILUM_P_OPTIONAL != 0,
         bounds,
-        usual: Bounds {
-            lower: p.usual_lower,
-            open_lower: false,
-            upper: p.usual_upper,
-            open_upper: false,
-        },
+        usual: Bounds::closed(p.usual_lower, p.usual_upper),
         choices,
     })
 }
@@ -283,7 +275,7 @@ fn describe_formulation(
     allowance: &Allowance,
 ) -> Result<FormulationDescription, String> {
     let name = hypothesis.name();
-    let (gradient_id, flux_id) = crate::words(hypothesis);
+    let (gradient_id, flux_id) = words(hypothesis);
     let pair = [
         (gradient_id, formulation.gradient, formulation.n_gradients),
         (flux_id, formulation.flux, formulation.n_fluxes),

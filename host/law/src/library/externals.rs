@@ -4,7 +4,8 @@
 //! says which one it is to [`trapped`], which ends the process. It is loaded before the library, so
 //! that this finds them however it was linked (`-z now`) and whatever `LD_BIND_NOW` says.
 
-use crate::inspect;
+use crate::needs::{expanded, needs};
+use crate::process::library_bytes;
 use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_LAZY, RTLD_LOCAL, RTLD_NOW};
 use object::{Object, ObjectSymbol, RelocationFlags, RelocationTarget, elf};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -64,12 +65,13 @@ fn list(names: &BTreeSet<String>) -> String {
 /// else keeps it from being loaded.
 pub(super) fn missing(path: &Path) -> Option<Missing> {
     let bytes = file::read_library(path).ok()?;
-    let undefined = undefined(&bytes)?;
-    let inspection = inspect::inspect_bytes(path, &bytes).ok()?;
-    let origin = path.parent().unwrap_or(Path::new(""));
+    let file = object::File::parse(&*bytes).ok()?;
+    let undefined = undefined(&file)?;
+    let (needs, search) = needs(&file, &bytes).ok()?;
+    let folders = expanded(&search, path);
     let mut suppliers = vec![Library::this()];
-    for name in &inspection.needs {
-        suppliers.push(open_needed(name, &inspection.search, origin)?);
+    for name in &needs {
+        suppliers.push(open_needed(name, &folders)?);
     }
     let mut missing = Missing::default();
     for (name, is_only_called) in undefined {
@@ -94,14 +96,10 @@ pub(super) fn missing(path: &Path) -> Option<Missing> {
 }
 
 /// Opens a library that another needs, where that one looks for it.
-fn open_needed(name: &str, search: &[String], origin: &Path) -> Option<Library> {
-    let origin = origin.to_string_lossy();
-    let expanded = search.iter().map(|folder| {
-        let folder = folder.replace("${ORIGIN}", &origin);
-        PathBuf::from(folder.replace("$ORIGIN", &origin)).join(name)
-    });
-    let mut found = expanded.filter(|path| path.is_file());
-    let path = found.next().unwrap_or_else(|| PathBuf::from(name));
+fn open_needed(name: &str, folders: &[PathBuf]) -> Option<Library> {
+    let mut places = folders.iter().map(|folder| folder.join(name));
+    let found = places.find(|path| path.is_file());
+    let path = found.unwrap_or_else(|| PathBuf::from(name));
     // SAFETY: the library that the user named would have it loaded, too.
     super::apart(&path, || unsafe {
         Library::open(Some(&path), RTLD_LAZY | RTLD_LOCAL)
@@ -110,8 +108,7 @@ fn open_needed(name: &str, search: &[String], origin: &Path) -> Option<Library> 
 }
 
 /// Names that an ELF file must be given, and whether they are only called. Weak ones may be absent.
-fn undefined(bytes: &[u8]) -> Option<BTreeMap<String, bool>> {
-    let file = object::File::parse(bytes).ok()?;
+fn undefined(file: &object::File<'_>) -> Option<BTreeMap<String, bool>> {
     if file.format() != object::BinaryFormat::Elf {
         return None;
     }
@@ -171,8 +168,7 @@ pub(super) fn trap(missing: &Missing) -> Result<(), String> {
 fn load_traps(library: &[u8]) -> Result<(), String> {
     use std::os::fd::AsRawFd;
     let failed = |why: &dyn std::fmt::Display| format!("its traps cannot be loaded: {why}");
-    let mut memory =
-        super::super::library_bytes::memory_file("pilum_traps").map_err(|why| failed(&why))?;
+    let mut memory = library_bytes::memory_file("pilum_traps").map_err(|why| failed(&why))?;
     memory.write_all(library).map_err(|why| failed(&why))?;
     let path = format!("/proc/self/fd/{}", memory.as_raw_fd());
     // SAFETY: it is made here and has no initialisers.

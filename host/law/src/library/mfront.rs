@@ -1,6 +1,6 @@
 //! Opening a library with behaviours of MFront's generic interface, and calling one.
 
-use super::super::library_bytes::Image;
+use crate::process::library_bytes::Image;
 use std::ffi::{CStr, CString, c_char, c_int};
 use std::path::Path;
 use std::ptr::null_mut;
@@ -91,7 +91,7 @@ impl Behaviour {
             .unwrap_or_else(PoisonError::into_inner);
         // SAFETY: running the library's initialisers is what loading means; the user named it.
         let library: &'static libloading::Library =
-            Box::leak(Box::new(unsafe { super::umat::load_private(path, image) }?));
+            Box::leak(Box::new(unsafe { super::load_image(path, image, true) }?));
         // SAFETY: the interface: `<behaviour>_<hypothesis>` is of this type.
         let integrate = unsafe { library.get::<Integrate>(function.as_bytes()) }
             .map_err(|_| format!("it has no function {function}"))?;

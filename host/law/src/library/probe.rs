@@ -2,25 +2,32 @@
 //! protection are chosen, and with arguments that a host in earnest never gives. All that a caller
 //! hands over and gets back is safe.
 
+mod arrays;
 pub mod call_log;
+mod entry;
+mod form;
 mod pages;
 pub mod process;
 
-use super::{Call, HOST, LawHandle, NOTHING, NOWHERE, OwnedInstance, Strided, load};
-use crate::adapter::{ForeignInstance, ForeignLaw};
-use crate::{Moment, Site};
+use super::{HOST, LawHandle, OwnedInstance};
+pub use crate::call::PointStart;
+use crate::call::{End, Moment, Operator, Outcomes, PointCall, Request, Strided};
+use crate::description::FormulationDescription;
+use crate::instance::{Answer as Answered, Instance, Source};
 use abi::Hypothesis;
-use abi::raw::{self, Batch, Host, Instance, MagicBlock, Rates, Status, View, ViewMut};
+use abi::raw::{self, Batch, Status};
 use abi::status::most_severe;
-use abi::version;
+use arrays::{Array, Directions, in_pages, inputs, message_buffer};
 use call_log::{Function, KeptCall, KeptPhase, Phase};
+use entry::other_host;
+pub use entry::{enter, open, shake_hands};
+use form::terminated;
+pub use form::{Answer, Form, Order, PointEnd};
 pub use pages::Fence;
 use pages::Pages;
-use serde::{Deserialize, Serialize};
 use std::ffi::c_char;
 use std::io;
 use std::mem::size_of;
-use std::path::Path;
 use std::ptr::{null, null_mut};
 
 /// Content of cells before a law has written them: a NaN that no computation produces.
@@ -30,283 +37,11 @@ pub const NO_OUTCOME: Status = -0x5a5a;
 /// Size of this host's batch, in bytes.
 pub const BATCH_BYTES: usize = size_of::<Batch>();
 
-/// How the values of several points are in memory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Order {
-    /// Point by point.
-    Points,
-    /// Component by component.
-    Components,
-    /// With gaps between components and between points.
-    Spread,
-    /// Inputs only once, for all points; outputs point by point.
-    Uniform,
-}
-
-impl Order {
-    /// How, for messages.
-    pub fn words(self) -> &'static str {
-        match self {
-            Self::Points => "which stands point by point",
-            Self::Components => "which stands component by component",
-            Self::Spread => "which stands with gaps",
-            Self::Uniform => "whose inputs stand once for all points",
-        }
-    }
-}
-
-/// A point at the start of an increment, and its gradient at the end.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PointStart {
-    /// Gradient at the start.
-    pub gradient0: Vec<f64>,
-    /// Gradient at the end.
-    pub gradient1: Vec<f64>,
-    /// Flux at the start.
-    pub flux0: Vec<f64>,
-    /// Internal variables at the start.
-    pub state0: Vec<f64>,
-}
-
-/// Results of a law for a point.
-#[derive(Clone, Debug)]
-pub struct PointEnd {
-    /// Outcome; [`NO_OUTCOME`] where none was written or none could be.
-    pub status: Status,
-    /// Step factor.
-    pub step_factor: f64,
-    /// Flux.
-    pub flux: Vec<f64>,
-    /// Internal variables.
-    pub state: Vec<f64>,
-    /// Operator, row by row; empty if none was requested.
-    pub tangent: Vec<f64>,
-}
-
-/// All that one call has left behind.
-#[derive(Clone, Debug)]
-pub struct Answer {
-    /// What the call returned.
-    pub status: Status,
-    /// The whole message buffer.
-    pub message: Vec<u8>,
-    /// The points.
-    pub points: Vec<PointEnd>,
-    /// Something was written between the cells of an output.
-    pub stray: bool,
-}
-
-impl Answer {
-    /// The message up to its NUL; `None` without a NUL.
-    pub fn text(&self) -> Option<String> {
-        terminated(&self.message)
-    }
-}
-
-fn terminated(buffer: &[u8]) -> Option<String> {
-    let end = buffer.iter().position(|&byte| byte == 0)?;
-    Some(String::from_utf8_lossy(&buffer[..end]).into_owned())
-}
-
-/// The form of a call.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Form {
-    /// Requests.
-    pub request: u32,
-    /// Layout of all arrays.
-    pub order: Order,
-    /// What lies next to inputs.
-    pub around_inputs: Fence,
-    /// What lies next to outputs.
-    pub around_outputs: Fence,
-    /// Writing to an input ends the process.
-    pub inputs_locked: bool,
-    /// Hand over `status` and `step_factor`.
-    pub outcomes: bool,
-    /// Size of the message buffer; none: null.
-    pub message: Option<usize>,
-    /// Size of the batch struct, in bytes.
-    pub batch_bytes: usize,
-    /// Number of the first point.
-    pub first_point: u64,
-    /// Time at which the increment begins, in all and in its step.
-    pub time: f64,
-    /// Length of the increment in time.
-    pub time_increment: f64,
-    /// Numbers of step and increment for a routine; by default those of [`Form::when`].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub moment: Option<Moment>,
-    /// Coordinates of the points for a routine.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub site: Option<Site>,
-    /// Ask for the consistent tangent even of a law that declares none; else its elastic operator
-    /// is in, as in a run.
-    pub verbatim: bool,
-}
-
 /// Rates of what a point's update starts from.
-#[derive(Clone, Debug)]
-pub struct PointRates {
-    /// The gradient at the start.
-    pub gradient0: Vec<f64>,
-    /// The gradient at the end.
-    pub gradient1: Vec<f64>,
-    /// The flux at the start.
-    pub flux0: Vec<f64>,
-    /// The internal variables at the start.
-    pub state0: Vec<f64>,
-}
+pub type PointRates = PointStart;
 
 /// Rates that a law has written for a point: of its flux, and of its internal variables.
 pub type EndRates = (Vec<f64>, Vec<f64>);
-
-impl Form {
-    /// An ordinary call with these requests, whose arrays have room to spare around them.
-    pub fn of(request: u32) -> Self {
-        Self {
-            request,
-            order: Order::Points,
-            around_inputs: Fence::Far,
-            around_outputs: Fence::Far,
-            inputs_locked: false,
-            outcomes: true,
-            message: Some(512),
-            batch_bytes: BATCH_BYTES,
-            first_point: 0,
-            time: 0.0,
-            time_increment: 1.0,
-            moment: None,
-            site: None,
-            verbatim: false,
-        }
-    }
-
-    /// At what time an increment begins, and which one it is: as in a run the first one of all for a point whose
-    /// gradient is zero, else one like the second.
-    pub fn when(&self, start: &PointStart) -> (f64, Moment) {
-        if let Some(moment) = self.moment {
-            return (self.time, moment);
-        }
-        if start.gradient0.iter().all(|value| *value == 0.0) {
-            return (self.time, Moment::default());
-        }
-        let second = Moment {
-            increment: 2,
-            ..Moment::default()
-        };
-        (self.time + self.time_increment, second)
-    }
-}
-
-/// Values of many points in their own pages.
-#[derive(Debug)]
-struct Array {
-    pages: Pages,
-    n_points: usize,
-    n_components: usize,
-    point: usize,
-    component: usize,
-}
-
-impl Array {
-    fn new(
-        order: Order,
-        is_input: bool,
-        n_points: usize,
-        n_components: usize,
-        fence: Fence,
-    ) -> io::Result<Self> {
-        let (point, component) = match order {
-            Order::Uniform if is_input => (0, 1),
-            Order::Points | Order::Uniform => (n_components, 1),
-            Order::Components => (1, n_points),
-            Order::Spread => (3 * n_components + 5, 3),
-        };
-        let cells = if n_points == 0 || n_components == 0 {
-            0
-        } else {
-            (n_points - 1) * point + (n_components - 1) * component + 1
-        };
-        let mut pages = Pages::new(cells * size_of::<f64>(), fence)?;
-        doubles_mut(&mut pages).fill(UNWRITTEN);
-        Ok(Self {
-            pages,
-            n_points,
-            n_components,
-            point,
-            component,
-        })
-    }
-
-    fn put(&mut self, i: usize, values: &[f64]) {
-        assert!(i < self.n_points && values.len() == self.n_components);
-        for (c, &value) in values.iter().enumerate() {
-            doubles_mut(&mut self.pages)[i * self.point + c * self.component] = value;
-        }
-    }
-
-    fn row(&self, i: usize) -> Vec<f64> {
-        (0..self.n_components)
-            .map(|c| doubles(&self.pages)[i * self.point + c * self.component])
-            .collect()
-    }
-
-    /// Whether anything but the cells was written.
-    fn stray(&self) -> bool {
-        let mut is_cell = vec![false; doubles(&self.pages).len()];
-        for i in 0..self.n_points {
-            for c in 0..self.n_components {
-                is_cell[i * self.point + c * self.component] = true;
-            }
-        }
-        doubles(&self.pages)
-            .iter()
-            .zip(is_cell)
-            .any(|(value, is_cell)| !is_cell && value.to_bits() != UNWRITTEN.to_bits())
-    }
-
-    fn is_nothing(&self) -> bool {
-        self.n_points == 0 || self.n_components == 0
-    }
-
-    fn view(&self) -> View {
-        if self.is_nothing() {
-            return NOTHING;
-        }
-        View {
-            p: self.pages.pointer().cast(),
-            point: self.point as isize,
-            component: self.component as isize,
-        }
-    }
-
-    fn view_mut(&self) -> ViewMut {
-        if self.is_nothing() {
-            return NOWHERE;
-        }
-        ViewMut {
-            p: self.pages.pointer().cast(),
-            point: self.point as isize,
-            component: self.component as isize,
-        }
-    }
-}
-
-fn doubles(pages: &Pages) -> &[f64] {
-    // SAFETY: every bit pattern is a double; the bytes are aligned for one, since arrays of
-    // doubles are a multiple of eight bytes long and end or start at the end of a page.
-    let (before, values, _) = unsafe { pages.bytes().align_to() };
-    assert!(before.is_empty());
-    values
-}
-
-fn doubles_mut(pages: &mut Pages) -> &mut [f64] {
-    // SAFETY: as above.
-    let (before, values, _) = unsafe { pages.bytes_mut().align_to_mut() };
-    assert!(before.is_empty());
-    values
-}
 
 /// A law whose parameters are fixed, to be probed.
 #[derive(Debug)]
@@ -324,19 +59,33 @@ pub struct Probe {
 #[derive(Debug)]
 enum Held {
     Own(OwnedInstance),
-    Foreign(Box<dyn ForeignInstance>),
+    Foreign(Box<dyn Instance>),
 }
 
 impl Drop for Probe {
     fn drop(&mut self) {
         if let Held::Own(_) = self.instance {
             // `destroy` is called all the same if that cannot be written.
-            let _ = call_log::keep(|| {
-                let names = (self.id.as_str(), self.hypothesis.name());
-                KeptCall::new(names, Function::Destroy, Form::of(0), &self.values, &[])
-            });
+            let _ = keep(self.whose(), Function::Destroy, Form::of(0), &[]);
         }
     }
+}
+
+/// Writes down a call that is about to be made, of this law under this hypothesis with these parameters.
+fn keep(
+    (id, hypothesis, values): (&str, Hypothesis, &[f64]),
+    function: Function,
+    form: Form,
+    starts: &[PointStart],
+) -> io::Result<()> {
+    call_log::keep(|| KeptCall {
+        law: id.to_owned(),
+        hypothesis: hypothesis.name().to_owned(),
+        function,
+        form,
+        parameters: values.to_vec(),
+        points: starts.to_vec(),
+    })
 }
 
 /// Arguments of `create`.
@@ -380,37 +129,6 @@ impl Created {
     }
 }
 
-/// The host's description with another minor version, or with bytes at its end that this version does
-/// not know. It stays for the life of the process.
-fn other_host(more: usize, abi_minor: u16) -> io::Result<*const Host> {
-    let size = size_of::<Host>() + more;
-    let mut pages = Pages::new(size, Fence::After)?;
-    pages.bytes_mut().fill(0xa5);
-    let (before, hosts, _) = {
-        // SAFETY: these bytes may be anything, since only a host is written to them.
-        unsafe {
-            pages
-                .bytes_mut()
-                .align_to_mut::<std::mem::MaybeUninit<Host>>()
-        }
-    };
-    let at: *const Host = match (before, hosts) {
-        ([], [host, ..]) => host.write(Host {
-            struct_size: size as u32,
-            abi_minor,
-            ..HOST.0
-        }),
-        _ => {
-            return Err(io::Error::other(
-                "the description of the host is not aligned",
-            ));
-        }
-    };
-    pages.lock()?;
-    std::mem::forget(pages);
-    Ok(at)
-}
-
 /// Calls `create`.
 ///
 /// # Errors
@@ -433,12 +151,14 @@ pub(crate) fn create(id: &str, law: LawHandle, form: &CreateForm<'_>) -> io::Res
         })
         .transpose()?;
     let message = message_buffer(form.message)?;
-    let mut instance: *mut Instance = null_mut();
+    let mut instance: *mut raw::Instance = null_mut();
     let all = form.values.unwrap_or_default();
-    call_log::keep(|| {
-        let names = (id, form.hypothesis.name());
-        KeptCall::new(names, Function::Create, Form::of(0), all, &[])
-    })?;
+    keep(
+        (id, form.hypothesis, all),
+        Function::Create,
+        Form::of(0),
+        &[],
+    )?;
     // SAFETY: contract, "create": `law.at` is the law itself; values, messages and `out` are as
     // long as told, or null, which the law has to refuse.
     let status = unsafe {
@@ -458,14 +178,14 @@ pub(crate) fn create(id: &str, law: LawHandle, form: &CreateForm<'_>) -> io::Res
     Ok(Created {
         status,
         message: message.map_or(Vec::new(), |pages| pages.bytes().to_vec()),
-        probe: (!instance.is_null()).then(|| Probe {
-            instance: Held::Own(OwnedInstance { law, instance }),
-            id: id.to_owned(),
-            hypothesis: form.hypothesis,
-            values: all.to_vec(),
-            n_components: form.hypothesis.n_components(),
-            n_states: form.n_states,
-            lacks_tangent: form.lacks_tangent,
+        probe: (!instance.is_null()).then(|| {
+            let own = OwnedInstance {
+                law,
+                instance,
+                n_components: form.hypothesis.n_components(),
+                n_states: form.n_states,
+            };
+            Probe::new(Held::Own(own), id, form)
         }),
     })
 }
@@ -476,27 +196,22 @@ pub(crate) fn create(id: &str, law: LawHandle, form: &CreateForm<'_>) -> io::Res
 /// The record of the call cannot be written.
 pub(crate) fn create_foreign(
     id: &str,
-    law: &dyn ForeignLaw,
+    law: &dyn Source,
+    formulation: &FormulationDescription,
     form: &CreateForm<'_>,
 ) -> io::Result<Created> {
     let values = form.values.unwrap_or_default();
-    call_log::keep(|| {
-        let names = (id, form.hypothesis.name());
-        KeptCall::new(names, Function::Create, Form::of(0), values, &[])
-    })?;
-    Ok(match law.create(form.hypothesis, values) {
+    keep(
+        (id, form.hypothesis, values),
+        Function::Create,
+        Form::of(0),
+        &[],
+    )?;
+    Ok(match law.create(form.hypothesis, formulation, values) {
         Ok(instance) => Created {
             status: raw::PILUM_OK,
             message: vec![0],
-            probe: Some(Probe {
-                instance: Held::Foreign(instance),
-                id: id.to_owned(),
-                hypothesis: form.hypothesis,
-                values: values.to_vec(),
-                n_components: form.hypothesis.n_components(),
-                n_states: form.n_states,
-                lacks_tangent: form.lacks_tangent,
-            }),
+            probe: Some(Probe::new(Held::Foreign(instance), id, form)),
         },
         Err((status, text)) => Created {
             status,
@@ -527,20 +242,23 @@ pub(crate) fn destroy_nothing(id: &str, law: LawHandle) {
     }
 }
 
-/// A message buffer as the host hands it over: its first byte is NUL, the rest is not.
-fn message_buffer(capacity: Option<usize>) -> io::Result<Option<Pages>> {
-    let Some(capacity) = capacity else {
-        return Ok(None);
-    };
-    let mut pages = Pages::new(capacity, Fence::After)?;
-    pages.bytes_mut().fill(b'#');
-    if let Some(first) = pages.bytes_mut().first_mut() {
-        *first = 0;
-    }
-    Ok(Some(pages))
-}
-
 impl Probe {
+    fn new(instance: Held, id: &str, form: &CreateForm<'_>) -> Self {
+        Self {
+            instance,
+            id: id.to_owned(),
+            hypothesis: form.hypothesis,
+            values: form.values.unwrap_or_default().to_vec(),
+            n_components: form.hypothesis.n_components(),
+            n_states: form.n_states,
+            lacks_tangent: form.lacks_tangent,
+        }
+    }
+
+    fn whose(&self) -> (&str, Hypothesis, &[f64]) {
+        (&self.id, self.hypothesis, &self.values)
+    }
+
     /// Number of components of gradient and flux.
     pub fn n_components(&self) -> usize {
         self.n_components
@@ -605,7 +323,7 @@ impl Probe {
             })
             .collect();
         if let Held::Foreign(instance) = &self.instance {
-            return self.start_foreign(&**instance, &starts, form);
+            return self.call_foreign(&**instance, Function::InitState, &starts, form);
         }
         let answer = self.call(Function::InitState, &starts, None, form)?;
         Ok(Some(answer.0))
@@ -675,6 +393,7 @@ impl Probe {
             Held::Own(own) => own,
             Held::Foreign(instance) => {
                 let answer = self.call_foreign(&**instance, function, starts, form)?;
+                let answer = answer.ok_or_else(|| io::Error::other("there is no such function"))?;
                 return Ok((answer, Vec::new()));
             }
         };
@@ -695,15 +414,13 @@ impl Probe {
             n_gradient * n_gradient
         };
         let n_state0 = if integrating { self.n_states } else { 0 };
-        let input = |n_components, values: fn(&PointStart) -> &[f64]| -> io::Result<Array> {
-            let mut array = Array::new(form.order, true, n, n_components, form.around_inputs)?;
-            for (i, start) in starts.iter().enumerate() {
-                array.put(i, values(start));
-            }
+        let input = |n_components, values| {
+            let place = (form.order, form.around_inputs);
+            let mut array = inputs(place, n_components, starts, values)?;
             if form.inputs_locked {
                 array.pages.lock()?;
             }
-            Ok(array)
+            io::Result::Ok(array)
         };
         let output =
             |n_components| Array::new(form.order, false, n, n_components, form.around_outputs);
@@ -718,7 +435,7 @@ impl Probe {
             .map(|(rates, parameter)| Directions::new(self, rates, parameter))
             .transpose()?;
         let given = directions.as_ref().map(Directions::raw);
-        let step_factor = output_of_one(n, form)?;
+        let step_factor = Array::new(Order::Points, false, n, 1, form.around_outputs)?;
         let mut status = Pages::new(n * size_of::<Status>(), form.around_outputs)?;
         for four in status.bytes_mut().chunks_exact_mut(size_of::<Status>()) {
             four.copy_from_slice(&NO_OUTCOME.to_ne_bytes());
@@ -754,10 +471,7 @@ impl Probe {
             rates: given.as_ref().map_or(null(), std::ptr::from_ref),
         };
         let letter = in_pages(&batch, form.batch_bytes)?;
-        call_log::keep(|| {
-            let names = (self.id.as_str(), self.hypothesis.name());
-            KeptCall::new(names, function, *form, &self.values, starts)
-        })?;
+        keep(self.whose(), function, *form, starts)?;
         // SAFETY: contract, "Batch": every view lies in pages that live until the end of this
         // function; a batch that tells less than version 1.0 has to be refused unread.
         let returned = unsafe { called(own.instance, letter.pointer().cast()) };
@@ -789,46 +503,30 @@ impl Probe {
 }
 
 impl Probe {
-    /// Initial internal variables through an adapter. `None` if the description says all there is to say.
-    fn start_foreign(
+    /// A call through an adapter, which has separate arrays: requests, times and places are those of the form. `None` if
+    /// it is one for initial internal variables, and the description says all there is to say of them.
+    fn call_foreign(
         &self,
-        instance: &dyn ForeignInstance,
+        instance: &dyn Instance,
+        function: Function,
         starts: &[PointStart],
         form: &Form,
     ) -> io::Result<Option<Answer>> {
-        let rows = Strided::rows(self.n_components);
-        call_log::keep(|| {
-            let names = (self.id.as_str(), self.hypothesis.name());
-            KeptCall::new(names, Function::InitState, *form, &self.values, starts)
-        })?;
+        keep(self.whose(), function, *form, starts)?;
+        let request = match function {
+            Function::InitState => Request::InitialState,
+            _ => Request::Update(Operator::of_request(self.asked(form))),
+        };
         let mut worst = (raw::PILUM_OK, String::new());
         let mut points = Vec::new();
-        for start in starts {
-            let mut end = self.nothing_yet(0);
-            let begun = instance.init_state(Call {
-                request: 0,
-                n_points: 1,
-                n_components: self.n_components,
-                n_states: self.n_states,
-                time: form.time,
-                time_increment: form.time_increment,
-                moment: Moment::default(),
-                sites: &[],
-                gradient0: None,
-                gradient1: None,
-                flux0: (&start.flux0, rows),
-                state0: &[],
-                flux1: None,
-                state1: &mut end.state,
-                tangent: &mut [],
-                status: std::slice::from_mut(&mut end.status),
-                step_factor: std::slice::from_mut(&mut end.step_factor),
-            });
-            let Some((returned, text)) = begun else {
+        for (i, start) in starts.iter().enumerate() {
+            let Some(((returned, text), end)) = self.call_of_point(instance, request, start, form)
+            else {
                 return Ok(None);
             };
-            if most_severe(worst.0, returned) != worst.0 {
-                worst = (returned, text);
+            let status = most_severe(worst.0, returned);
+            if status != worst.0 {
+                worst = (status, text.replacen("point 0:", &format!("point {i}:"), 1));
             }
             points.push(end);
         }
@@ -840,209 +538,45 @@ impl Probe {
         }))
     }
 
-    /// A point before anything is written, with this many entries of an operator.
-    fn nothing_yet(&self, n_operator: usize) -> PointEnd {
-        PointEnd {
+    /// What an adapter makes of one point.
+    fn call_of_point(
+        &self,
+        instance: &dyn Instance,
+        request: Request,
+        start: &PointStart,
+        form: &Form,
+    ) -> Option<(Answered, PointEnd)> {
+        let is_update = request != Request::InitialState;
+        let first = (form.time, Moment::default());
+        let (time, moment) = if is_update { form.when(start) } else { first };
+        let call = PointCall {
+            request,
+            start: start.clone(),
+            time,
+            time_increment: form.time_increment,
+            moment,
+            site: form.site.filter(|_| is_update).unwrap_or_default(),
+        };
+        let mut outcomes = Outcomes {
+            status: vec![NO_OUTCOME],
+            factor: vec![f64::NAN],
+        };
+        let mut point = PointEnd {
             status: NO_OUTCOME,
             step_factor: f64::NAN,
             flux: vec![f64::NAN; self.n_components],
             state: vec![f64::NAN; self.n_states],
-            tangent: vec![f64::NAN; n_operator],
-        }
-    }
-
-    /// A call through an adapter, which has separate arrays: requests, times and places are those of the form.
-    fn call_foreign(
-        &self,
-        instance: &dyn ForeignInstance,
-        function: Function,
-        starts: &[PointStart],
-        form: &Form,
-    ) -> io::Result<Answer> {
-        if function != Function::Integrate {
-            return Err(io::Error::other("there is no such function"));
-        }
-        let c = self.n_components;
-        let request = self.asked(form);
-        let wants_tangent = request & (raw::PILUM_REQ_TANGENT | raw::PILUM_REQ_ELASTIC) != 0;
-        let rows = Strided::rows(c);
-        call_log::keep(|| {
-            let names = (self.id.as_str(), self.hypothesis.name());
-            KeptCall::new(names, function, *form, &self.values, starts)
-        })?;
-        let mut worst = (raw::PILUM_OK, String::new());
-        let mut points = Vec::new();
-        for (i, start) in starts.iter().enumerate() {
-            let (time, moment) = form.when(start);
-            let mut end = self.nothing_yet(if wants_tangent { c * c } else { 0 });
-            let (returned, text) = instance.integrate(Call {
-                request,
-                n_points: 1,
-                n_components: c,
-                n_states: self.n_states,
-                time,
-                time_increment: form.time_increment,
-                moment,
-                sites: &[form.site.unwrap_or_default()],
-                gradient0: Some((&start.gradient0, rows)),
-                gradient1: Some((&start.gradient1, rows)),
-                flux0: (&start.flux0, rows),
-                state0: &start.state0,
-                flux1: Some((&mut end.flux, rows)),
-                state1: &mut end.state,
-                tangent: &mut end.tangent,
-                status: std::slice::from_mut(&mut end.status),
-                step_factor: std::slice::from_mut(&mut end.step_factor),
-            });
-            let status = most_severe(worst.0, returned);
-            if status != worst.0 {
-                worst = (status, text.replacen("point 0:", &format!("point {i}:"), 1));
-            }
-            points.push(end);
-        }
-        Ok(Answer {
-            status: worst.0,
-            message: ended(worst.1),
-            points,
-            stray: false,
-        })
-    }
-}
-
-/// The arrays of rates of one call.
-struct Directions {
-    parameter: Array,
-    gradient0: Array,
-    gradient1: Array,
-    flux0: Array,
-    state0: Array,
-    flux1: Array,
-    state1: Array,
-}
-
-impl Directions {
-    fn new(probe: &Probe, rates: &[PointRates], parameter: &[f64]) -> io::Result<Self> {
-        let n = rates.len();
-        let input = |n_components, values: fn(&PointRates) -> &[f64]| -> io::Result<Array> {
-            let mut array = Array::new(Order::Points, true, n, n_components, Fence::Far)?;
-            for (i, one) in rates.iter().enumerate() {
-                array.put(i, values(one));
-            }
-            Ok(array)
+            tangent: Vec::new(),
         };
-        let output = |n_components| Array::new(Order::Points, false, n, n_components, Fence::Far);
-        let mut of_parameters = Array::new(Order::Points, true, 1, parameter.len(), Fence::After)?;
-        of_parameters.put(0, parameter);
-        Ok(Self {
-            parameter: of_parameters,
-            gradient0: input(probe.n_components, |one| &one.gradient0)?,
-            gradient1: input(probe.n_components, |one| &one.gradient1)?,
-            flux0: input(probe.n_components, |one| &one.flux0)?,
-            state0: input(probe.n_states, |one| &one.state0)?,
-            flux1: output(probe.n_components)?,
-            state1: output(probe.n_states)?,
-        })
-    }
-
-    /// The output of the law.
-    fn rows(&self) -> Vec<EndRates> {
-        let n = self.flux1.n_points;
-        let row = |i| (self.flux1.row(i), self.state1.row(i));
-        (0..n).map(row).collect()
-    }
-
-    fn raw(&self) -> Rates {
-        Rates {
-            struct_size: size_of::<Rates>() as u32,
-            reserved: 0,
-            parameter: self.parameter.view().p,
-            gradient0: self.gradient0.view(),
-            gradient1: self.gradient1.view(),
-            flux0: self.flux0.view(),
-            state0: self.state0.view(),
-            flux1: self.flux1.view_mut(),
-            state1: self.state1.view_mut(),
+        let mut end = End::of_state(&mut point.state);
+        if let Request::Update(operator) = request {
+            point.tangent = vec![f64::NAN; operator.n_entries(self.n_components)];
+            end.flux = (&mut point.flux, Strided::rows(self.n_components));
+            end.operator = &mut point.tangent;
         }
+        let answer = instance.call(request, (&call.as_start(), &mut end, &mut outcomes))?;
+        point.status = outcomes.status[0];
+        point.step_factor = outcomes.factor[0];
+        Some((answer, point))
     }
-}
-
-fn output_of_one(n_points: usize, form: &Form) -> io::Result<Array> {
-    Array::new(Order::Points, false, n_points, 1, form.around_outputs)
-}
-
-/// The first bytes of a batch in read-only pages that end where it says; bytes beyond it are 0xa5.
-fn in_pages(batch: &Batch, bytes: usize) -> io::Result<Pages> {
-    let mut pages = Pages::new(bytes, Fence::After)?;
-    pages.bytes_mut().fill(0xa5);
-    // SAFETY: a batch consists of numbers and pointers without padding.
-    let known = unsafe {
-        std::slice::from_raw_parts(std::ptr::from_ref(batch).cast::<u8>(), size_of::<Batch>())
-    };
-    let n = bytes.min(known.len());
-    pages.bytes_mut()[..n].copy_from_slice(&known[..n]);
-    pages.lock()?;
-    Ok(pages)
-}
-
-/// Opens a library with all its symbols, and no more.
-///
-/// # Errors
-/// What the system says.
-pub fn open(path: &Path) -> Result<(), String> {
-    symbols(path).map(|_| ())
-}
-
-/// Notes what is about to be done with a library that is loaded from its file.
-fn begin(phase: Phase) -> Result<(), String> {
-    call_log::keep_phase(KeptPhase::new(phase, true)).map_err(|error| error.to_string())
-}
-
-/// The library, never unloaded.
-fn symbols(path: &Path) -> Result<&'static libloading::Library, String> {
-    begin(Phase::Load)?;
-    // SAFETY: running the library's initialisers is what loading means; the user named it.
-    let library = unsafe { load(path, path) }.map_err(|error| {
-        std::error::Error::source(&error).map_or_else(|| error.to_string(), ToString::to_string)
-    })?;
-    Ok(Box::leak(Box::new(library)))
-}
-
-/// Compares the handshake block with this host's.
-///
-/// # Errors
-/// It is missing, or the first field that differs.
-pub fn shake_hands(path: &Path) -> Result<(), String> {
-    // SAFETY: contract, "Handshake": `pilum_magic` is a data symbol of this type for ever.
-    let magic = unsafe { symbols(path)?.get::<*const MagicBlock>(b"pilum_magic\0") }
-        .map_err(|_| "there is no symbol `pilum_magic`".to_owned())?;
-    begin(Phase::Handshake)?;
-    // SAFETY: as above; the block is at least 64 bytes in every version.
-    let magic = unsafe { (*magic).read_unaligned() };
-    version::check(&magic).map_err(|mismatch| mismatch.to_string())
-}
-
-/// Calls `pilum_entry` twice, then from another thread, with a host that is longer than this one.
-/// The addresses it returned.
-///
-/// # Errors
-/// There is no such function.
-pub fn enter(path: &Path) -> Result<[usize; 3], String> {
-    let library = symbols(path)?;
-    // SAFETY: contract, "Handshake": once the block is accepted, `pilum_entry` has this type.
-    let entry = *unsafe { library.get::<raw::Entry>(b"pilum_entry\0") }
-        .map_err(|_| "there is no symbol `pilum_entry`".to_owned())?;
-    // SAFETY: contract, "Entry": may be called with any valid host block, from any thread.
-    let call = move || unsafe { entry(&raw const HOST.0) }.addr();
-    let other = move || -> io::Result<usize> {
-        let host = other_host(64, raw::PILUM_ABI_MINOR)?;
-        // SAFETY: as above.
-        Ok(unsafe { entry(host) }.addr())
-    };
-    begin(Phase::Entry)?;
-    let (first, second) = (call(), call());
-    let third = std::thread::spawn(other)
-        .join()
-        .map_err(|_| "`pilum_entry` panicked".to_owned())?
-        .map_err(|error| error.to_string())?;
-    Ok([first, second, third])
 }

@@ -1,7 +1,8 @@
 //! Calls that are written down before they are made, so that the last one is known however the process
 //! ends; and what else runs of a library, on opening and at the end.
 
-use super::{Form, PointStart};
+use super::Form;
+use crate::call::PointStart;
 use serde::{Deserialize, Serialize};
 use std::fs::File;
 use std::io::{self, Seek, Write};
@@ -46,18 +47,6 @@ pub enum Phase {
 }
 
 impl Phase {
-    /// Its name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Load => "load",
-            Self::Handshake => "handshake",
-            Self::Entry => "entry",
-            Self::Describe => "describe",
-            Self::DestroyNull => "destroy_null",
-            Self::Exit => "exit",
-        }
-    }
-
     /// The activity, in words.
     pub fn words(self) -> &'static str {
         match self {
@@ -120,59 +109,20 @@ pub struct KeptCall {
     pub function: Function,
     /// How it is called.
     pub form: Form,
-    parameters: Vec<u64>,
-    points: Vec<[Vec<u64>; 4]>,
+    /// Values of the parameters.
+    #[serde(with = "crate::call::bits")]
+    pub parameters: Vec<f64>,
+    /// The points.
+    pub points: Vec<PointStart>,
 }
 
 impl KeptCall {
-    /// A call for these points.
-    pub fn new(
-        (law, hypothesis): (&str, &str),
-        function: Function,
-        form: Form,
-        parameters: &[f64],
-        points: &[PointStart],
-    ) -> Self {
-        let bits = |values: &[f64]| -> Vec<u64> { values.iter().map(|v| v.to_bits()).collect() };
-        let of_point =
-            |p: &PointStart| [&p.gradient0, &p.gradient1, &p.flux0, &p.state0].map(|v| bits(v));
-        Self {
-            law: law.to_owned(),
-            hypothesis: hypothesis.to_owned(),
-            function,
-            form,
-            parameters: bits(parameters),
-            points: points.iter().map(of_point).collect(),
-        }
-    }
-
     /// Whether it is one of the same instance, as far as that can be seen.
     fn is_of(&self, other: &Self) -> bool {
-        let own = (&self.law, &self.hypothesis, &self.parameters);
-        own == (&other.law, &other.hypothesis, &other.parameters)
+        let bits = |call: &Self| call.parameters.iter().map(|v| v.to_bits()).collect();
+        let own = (&self.law, &self.hypothesis, bits(self));
+        own == (&other.law, &other.hypothesis, bits(other) as Vec<u64>)
     }
-
-    /// Values of the parameters.
-    pub fn parameters(&self) -> Vec<f64> {
-        numbers(&self.parameters)
-    }
-
-    /// The points.
-    pub fn points(&self) -> Vec<PointStart> {
-        let points = self.points.iter();
-        points
-            .map(|[gradient0, gradient1, flux0, state0]| PointStart {
-                gradient0: numbers(gradient0),
-                gradient1: numbers(gradient1),
-                flux0: numbers(flux0),
-                state0: numbers(state0),
-            })
-            .collect()
-    }
-}
-
-fn numbers(bits: &[u64]) -> Vec<f64> {
-    bits.iter().map(|bits| f64::from_bits(*bits)).collect()
 }
 
 impl Kept {

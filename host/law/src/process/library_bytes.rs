@@ -17,6 +17,17 @@ use text::file;
 /// Bytes that are read, hashed and copied at a time: they stay in the processor's cache.
 const PIECE: usize = 1 << 15;
 
+/// SHA-256 of some bytes, in hexadecimal digits.
+pub fn hexadecimal_sha256(bytes: &[u8]) -> String {
+    hexadecimal(&Sha256::digest(bytes))
+}
+
+/// Bytes in hexadecimal digits.
+pub fn hexadecimal(digest: &[u8]) -> String {
+    let digits = digest.iter().map(|byte| format!("{byte:02x}"));
+    digits.collect()
+}
+
 /// A library's bytes.
 #[derive(Debug)]
 pub(crate) struct Image {
@@ -70,12 +81,25 @@ impl Image {
             }
         }
         Ok(Self {
-            sha256: super::hexadecimal(&hash.finalize()),
+            sha256: hexadecimal(&hash.finalize()),
             warnings,
             path: path.to_owned(),
             #[cfg(target_os = "linux")]
             sealed: memory.and_then(|memory| seal(memory, path)),
         })
+    }
+
+    /// Reads a file once more, which must have this SHA-256.
+    ///
+    /// # Errors
+    /// The defect of the file, in words.
+    pub(crate) fn again(path: &Path, sha256: &str) -> Result<Self, String> {
+        let image = Self::read(path)?;
+        if image.sha256 == sha256 {
+            Ok(image)
+        } else {
+            Err("it was changed".to_owned())
+        }
     }
 
     /// The path that stands for the very bytes that were hashed. The image must not be dropped

@@ -9,18 +9,17 @@
 //! that are tensors stay in them.
 
 use super::symbols::Symbols;
-use super::{
-    Foreign, ForeignInstance, ForeignLaw, ForeignLaws, PointEnd, PointStart, Refusal, each_point,
-};
+use super::{Foreign, ForeignLaws, Refusal, each_point};
 use crate::Error;
+use crate::call::{Batch, End, Operator, Request, Start};
 use crate::description::{
-    Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription, Tangent,
+    Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription, or,
 };
+use crate::instance::{Answer, Instance, Source};
 use crate::library::mfront::{Behaviour, Point, Sizes};
-use crate::library::{Call, CallFailure};
-use crate::library_bytes::Image;
+use crate::process::library_bytes::{Image, hexadecimal_sha256};
 use abi::Hypothesis;
-use abi::raw::{self, Status};
+use abi::raw;
 use std::f64::consts::SQRT_2;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -43,7 +42,7 @@ pub(super) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Erro
     let fault = |why: String| Error::library(format!("library {} {why}", path.display()));
     let bytes =
         text::file::read_library(path).map_err(|why| fault(format!("cannot be read: {why}")))?;
-    if crate::hexadecimal_sha256(&bytes) != image.sha256 {
+    if hexadecimal_sha256(&bytes) != image.sha256 {
         return Err(fault("was changed while it was read".to_owned()));
     }
     let symbols = Symbols::read(&bytes).map_err(fault)?;
@@ -59,22 +58,18 @@ pub(super) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Erro
             name,
         };
         let (law, slots, formulations) = reader.describe();
-        let law: (_, Arc<dyn ForeignLaw>) = (
-            law,
-            Arc::new(Mfront {
-                library: path.clone(),
-                sha256: image.sha256.clone(),
-                name: name.to_owned(),
-                slots,
-                formulations,
-            }),
-        );
-        law
+        let source: Arc<dyn Source> = Arc::new(Mfront {
+            library: path.clone(),
+            sha256: image.sha256.clone(),
+            name: name.to_owned(),
+            slots,
+            formulations,
+        });
+        (law, source)
     });
     Ok(ForeignLaws {
         laws: laws.collect(),
-        sidecar: None,
-        wishes: (None, None),
+        ..ForeignLaws::default()
     })
 }
 
@@ -101,10 +96,8 @@ enum Slot {
 /// A formulation there.
 #[derive(Clone, Debug)]
 struct Modelling {
-    hypothesis: Hypothesis,
     /// MFront's name of it.
     name: &'static str,
-    n_states: usize,
     /// What sets its parameters.
     setter: String,
 }
@@ -186,9 +179,7 @@ impl Reader<'_> {
                                 continue;
                             }
                             modellings.push(Modelling {
-                                hypothesis,
                                 name,
-                                n_states: formulation.internal_variables.len(),
                                 setter: self.symbol(name, "setParameter"),
                             });
                             formulations.push(formulation);
@@ -198,13 +189,6 @@ impl Reader<'_> {
                 }
             }
         }
-        let or = |text: String, other: &str| {
-            if text.is_empty() {
-                other.to_owned()
-            } else {
-                text
-            }
-        };
         let doc = match why.filter(|_| formulations.is_empty()) {
             Some(why) => format!("This host cannot use it: {why}."),
             None => or(self.text("description"), "A behaviour made with MFront."),
@@ -213,14 +197,14 @@ impl Reader<'_> {
             id: self.name.to_owned(),
             name: self.name.to_owned(),
             version: or(self.text("build_id"), "unknown"),
-            author: or(self.text("author"), "unknown"),
-            licence: "unknown licence".to_owned(),
+            author: self.text("author"),
+            licence: String::new(),
             doc,
-            references: or(self.text("src"), "none given"),
+            references: self.text("src"),
             parameters,
             formulations,
         };
-        (law, slots, modellings)
+        (law.completed(), slots, modellings)
     }
 
     /// The hypotheses under which there is a function.
@@ -336,24 +320,16 @@ impl Reader<'_> {
                 };
                 InternalVariable {
                     id,
-                    symbol: String::new(),
-                    unit: String::new(),
                     doc: doc.to_owned(),
-                    initial_value: 0.0,
-                    output_only: false,
+                    ..InternalVariable::default()
                 }
             }));
         }
         let formulation = FormulationDescription {
-            tangent: Tangent::default(),
-            rates: false,
             hypothesis: hypothesis.name(),
             index,
-            symmetric: false,
-            linear: false,
-            time_dependent: false,
-            local_axes: false,
             internal_variables,
+            ..FormulationDescription::default()
         };
         Ok((formulation, slots, parameters))
     }
@@ -364,22 +340,16 @@ impl Reader<'_> {
             let symbol = self.symbol(modelling, &format!("{name}_{which}"));
             self.symbols.long_double(&symbol).unwrap_or(missing)
         };
-        let bounds = |kind: &str| Bounds {
-            lower: bound(&format!("Lower{kind}Bound"), f64::NEG_INFINITY),
-            open_lower: false,
-            upper: bound(&format!("Upper{kind}Bound"), f64::INFINITY),
-            open_upper: false,
+        let bounds = |kind: &str| {
+            let lower = bound(&format!("Lower{kind}Bound"), f64::NEG_INFINITY);
+            Bounds::closed(lower, bound(&format!("Upper{kind}Bound"), f64::INFINITY))
         };
         ParameterDescription {
             id: name.to_owned(),
-            symbol: String::new(),
-            unit: String::new(),
-            doc: String::new(),
             default,
-            optional: false,
             bounds: bounds("Physical"),
             usual: bounds(""),
-            choices: Vec::new(),
+            ..ParameterDescription::default()
         }
     }
 }
@@ -409,27 +379,15 @@ struct Mfront {
     formulations: Vec<Modelling>,
 }
 
-impl ForeignLaw for Mfront {
-    fn is_serial(&self) -> bool {
-        // The interface asks for functions that may be called by several threads.
-        false
-    }
-
+// The interface asks for functions that may be called by several threads.
+impl Source for Mfront {
     fn create(
         &self,
         hypothesis: Hypothesis,
+        formulation: &FormulationDescription,
         parameters: &[f64],
-    ) -> Result<Box<dyn ForeignInstance>, CallFailure> {
-        let unusable = |why: String| (raw::PILUM_E_INTERNAL, why);
-        let modelling = self
-            .formulations
-            .iter()
-            .find(|f| f.hypothesis == hypothesis)
-            .ok_or_else(|| unusable("the hypothesis is not offered".to_owned()))?;
-        let image = Image::read(&self.library).map_err(unusable)?;
-        if image.sha256 != self.sha256 {
-            return Err(unusable("it was changed".to_owned()));
-        }
+    ) -> Result<Box<dyn Instance>, Answer> {
+        let modelling = &self.formulations[formulation.index as usize];
         let (mut properties, mut external, mut set) = (Vec::new(), Vec::new(), Vec::new());
         for (slot, &value) in self.slots.iter().zip(parameters) {
             match slot {
@@ -440,14 +398,15 @@ impl ForeignLaw for Mfront {
             }
         }
         let function = format!("{}_{}", self.name, modelling.name);
-        let behaviour = Behaviour::open(&self.library, image, &function, &modelling.setter, &set)
-            .map_err(unusable)?;
+        let open =
+            |image| Behaviour::open(&self.library, image, &function, &modelling.setter, &set);
+        let behaviour = Image::again(&self.library, &self.sha256).and_then(open);
         let n = hypothesis.n_components();
-        Ok(Box::new(Instance {
-            behaviour,
+        Ok(Box::new(Material {
+            behaviour: behaviour.map_err(|why| (raw::PILUM_E_INTERNAL, why))?,
             sizes: Sizes {
                 n,
-                n_states: modelling.n_states,
+                n_states: formulation.internal_variables.len(),
                 n_properties: properties.len(),
                 n_external: external.len(),
             },
@@ -460,7 +419,7 @@ impl ForeignLaw for Mfront {
 
 /// A behaviour with its parameters fixed.
 #[derive(Debug)]
-struct Instance {
+struct Material {
     behaviour: Behaviour,
     sizes: Sizes,
     /// The first component that carries √2.
@@ -469,8 +428,11 @@ struct Instance {
     external: Vec<f64>,
 }
 
-impl ForeignInstance for Instance {
-    fn integrate(&self, call: Call<'_>) -> (Status, String) {
+impl Instance for Material {
+    fn call(&self, request: Request, batch: Batch<'_, '_>) -> Option<Answer> {
+        let Request::Update(operator) = request else {
+            return None;
+        };
         let Sizes { n, n_states, .. } = self.sizes;
         let mut point = Point {
             gradients: [vec![0.0; n], vec![0.0; n]],
@@ -482,11 +444,14 @@ impl ForeignInstance for Instance {
             dt: 0.0,
             rdt: 1.0,
         };
-        each_point(call, |start, end| self.update(&mut point, start, end))
+        let sizes = (n, n_states, operator.n_entries(n));
+        Some(each_point(sizes, batch, |start, end| {
+            self.update(&mut point, operator, start, end)
+        }))
     }
 }
 
-impl Instance {
+impl Material {
     /// √2 of a shear, 1 of the others.
     fn root(&self, component: usize) -> f64 {
         if component < self.shear { 1.0 } else { SQRT_2 }
@@ -495,17 +460,17 @@ impl Instance {
     fn update(
         &self,
         point: &mut Point,
-        start: &PointStart<'_>,
-        end: &mut PointEnd<'_>,
+        operator: Operator,
+        start: &Start<'_>,
+        end: &mut End<'_>,
     ) -> Result<(), Refusal> {
-        let wants_elastic = start.request & raw::PILUM_REQ_ELASTIC != 0;
-        let request = match (end.operator.is_empty(), wants_elastic) {
-            (true, _) => NO_OPERATOR,
-            (_, true) => ELASTIC_OPERATOR,
-            (_, false) => CONSISTENT_OPERATOR,
+        let request = match operator {
+            Operator::None => NO_OPERATOR,
+            Operator::Elastic => ELASTIC_OPERATOR,
+            Operator::Consistent => CONSISTENT_OPERATOR,
         };
-        let unreliable = self.call(point, start, start.gradient_end, request)?;
-        for (i, to) in end.flux.iter_mut().enumerate() {
+        let unreliable = self.ask(point, start, request)?;
+        for (i, to) in end.flux.0.iter_mut().enumerate() {
             *to = point.forces[1][i] / self.root(i);
         }
         end.state.copy_from_slice(&point.states[1]);
@@ -517,18 +482,17 @@ impl Instance {
     }
 
     /// One call, from fresh arguments. `Ok(Err(…))`: done, but inaccurate.
-    fn call(
+    fn ask(
         &self,
         point: &mut Point,
-        start: &PointStart<'_>,
-        gradient_end: &[f64],
+        start: &Start<'_>,
         request: f64,
     ) -> Result<Result<(), Refusal>, Refusal> {
         for i in 0..self.sizes.n {
             let root = self.root(i);
-            point.gradients[0][i] = start.gradient[i] / root;
-            point.gradients[1][i] = gradient_end[i] / root;
-            let force = start.flux[i] * root;
+            point.gradients[0][i] = start.gradient.0[i] / root;
+            point.gradients[1][i] = start.gradient_end.0[i] / root;
+            let force = start.flux.0[i] * root;
             (point.forces[0][i], point.forces[1][i]) = (force, force);
         }
         for states in &mut point.states {

@@ -3,9 +3,10 @@
 //! After each call, read-only arguments are compared with what was handed over, and guard words with what they
 //! held. So damage is found where it is done, and not in the results of another argument.
 
-use super::Refusal;
+use super::{Order, Refusal};
 use abi::raw;
 use std::fmt::Write as _;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// Guard words on each side of an argument.
@@ -44,6 +45,9 @@ impl Role {
         matches!(self, Self::Array | Self::Output)
     }
 }
+
+/// Stress along the axes that a plane problem lacks, relative to the largest, that is rounding.
+const OUT_OF_PLANE: f64 = 1e-9;
 
 /// Name, kind and role of an argument.
 pub(super) type Argument = (&'static str, Kind, Role);
@@ -187,6 +191,62 @@ impl<const N: usize> Block<N> {
         i32::from_ne_bytes([a, b, c, d])
     }
 
+    /// Refuses results that hold a NaN: a smaller increment may mend it, unless there is none at all.
+    ///
+    /// # Errors
+    /// The first of these results that does.
+    pub(super) fn finite<A: Into<usize> + Copy>(
+        &self,
+        results: &[A],
+        is_at_rest: bool,
+    ) -> Result<(), Refusal> {
+        let mut results = results.iter().map(|result| (*result).into());
+        let Some(bad) = results.find(|i: &usize| !self.reals(*i).all(f64::is_finite)) else {
+            return Ok(());
+        };
+        let name = self.arguments[bad].0;
+        let (status, when) = if is_at_rest {
+            (raw::PILUM_E_INTERNAL, ", without any strain")
+        } else {
+            (raw::PILUM_E_NUMERIC, "")
+        };
+        let message = format!("the routine leaves {name} with values that are not finite{when}");
+        Err(Refusal::error(status, message))
+    }
+
+    /// A stress at one of these places that a plane problem lacks, and that is no rounding.
+    pub(super) fn out_of_plane(
+        &self,
+        stress: impl Into<usize> + Copy,
+        places: impl Iterator<Item = usize>,
+    ) -> Option<f64> {
+        let all: Vec<f64> = self.reals(stress).collect();
+        let largest = all.iter().fold(0.0_f64, |max, v| max.max(v.abs()));
+        let mut values = places.map(|place| all[place]);
+        values.find(|v| v.abs() > OUT_OF_PLANE * largest)
+    }
+
+    /// Copies rows and columns at these places of a square matrix, row by row.
+    pub(super) fn read_matrix(
+        &self,
+        matrix: impl Into<usize>,
+        order: Order,
+        places: &[usize],
+        to: &mut [f64],
+    ) {
+        let all: Vec<f64> = self.reals(matrix).collect();
+        let size = all.len().isqrt();
+        let pairs = places
+            .iter()
+            .flat_map(|row| places.iter().map(move |column| (row, column)));
+        for (to, (row, column)) in to.iter_mut().zip(pairs) {
+            *to = match order {
+                Order::Columns => all[row + column * size],
+                Order::Rows => all[row * size + column],
+            };
+        }
+    }
+
     /// The words of an argument and the number of its entries.
     pub(super) fn entries(&self, i: usize) -> (&[u64], usize) {
         (&self.words[self.range(i)], self.entries[i])
@@ -296,21 +356,50 @@ impl<const N: usize> Block<N> {
     }
 }
 
-/// Data common to all calls of a material, and one block for each simultaneous call.
+/// Data common to all calls of a material, one block for each simultaneous call, and what calls have done to them.
 #[derive(Debug)]
 pub(super) struct Blocks<const N: usize> {
     template: Block<N>,
     unused: Mutex<Vec<Block<N>>>,
     beside: Mutex<Option<Beside>>,
+    /// Whose turn it is, if calls must follow one another.
+    turn: Option<Mutex<()>>,
+    /// Copies that the routine has overwritten, by bits, and those that have been reported.
+    overwritten: AtomicU64,
+    told: AtomicU64,
 }
 
 impl<const N: usize> Blocks<N> {
-    pub(super) fn new(template: Block<N>) -> Self {
+    pub(super) fn new(template: Block<N>, is_serial: bool) -> Self {
         Self {
             template,
             unused: Mutex::default(),
             beside: Mutex::default(),
+            turn: is_serial.then(Mutex::default),
+            overwritten: AtomicU64::new(0),
+            told: AtomicU64::new(0),
         }
+    }
+
+    /// Takes note of the copies that a call has written to.
+    ///
+    /// # Errors
+    /// The first argument that it has written to without right, in words.
+    pub(super) fn returned(&self, block: &mut Block<N>) -> Result<(), Refusal> {
+        let overwritten = block.overwritten()?;
+        if overwritten != 0 {
+            self.overwritten.fetch_or(overwritten, Ordering::Relaxed);
+        }
+        Ok(())
+    }
+
+    /// Names of the copies that were written to, those that were not told before.
+    pub(super) fn take_overwritten(&self) -> Vec<String> {
+        let overwritten = self.overwritten.load(Ordering::Relaxed);
+        let told = self.told.swap(overwritten, Ordering::Relaxed);
+        let new = (0..N).filter(|i| (overwritten & !told) >> i & 1 == 1);
+        new.map(|i| self.template.arguments[i].0.to_owned())
+            .collect()
     }
 
     pub(super) fn template(&self) -> &Block<N> {
@@ -333,8 +422,10 @@ impl<const N: usize> Blocks<N> {
         Some(gap.map_or_else(String::new, |gap| self.template.place(gap)))
     }
 
-    /// Makes calls with a block that no other call uses.
+    /// Makes calls with a block that no other call uses, when it is their turn.
     pub(super) fn with<T>(&self, calls: impl FnOnce(&mut Block<N>) -> T) -> T {
+        let turn = self.turn.as_ref();
+        let _turn = turn.map(|turn| turn.lock().unwrap_or_else(PoisonError::into_inner));
         let unused = || self.unused.lock().unwrap_or_else(PoisonError::into_inner);
         let one = unused().pop();
         let mut block = one.unwrap_or_else(|| {
@@ -438,7 +529,7 @@ mod tests {
 
     #[test]
     fn another_number_stands_where_it_is_put_and_is_guarded() {
-        let blocks = Blocks::new(block());
+        let blocks = Blocks::new(block(), true);
         let seen = |at: isize| {
             blocks.with(|block| {
                 let word = block.words[block.at[1].checked_add_signed(at).unwrap()];

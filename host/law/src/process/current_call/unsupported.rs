@@ -1,6 +1,6 @@
 //! As on Unix, where processes can be watched; here nobody does.
 
-use super::Moment;
+use crate::call::Moment;
 
 /// The current activity of a law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,7 +19,7 @@ pub fn name(_text: &str) -> u64 {
 
 pub fn of_group(_group: u64, _first: usize, _per_element: usize) {}
 
-pub(super) fn calling<T>(
+pub fn calling<T>(
     _law: u64,
     _doing: Doing,
     _n_points: usize,

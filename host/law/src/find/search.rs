@@ -1,11 +1,12 @@
 //! Folders in which libraries are searched. Only explicit folders count, never the working directory.
 
-use super::adapter::Foreign;
-use super::{Library, LoadedLaw, Opener};
+use super::expected_hashes::Pins;
+use super::inspect;
+use super::opened::{Library, LoadedLaw};
+use super::opener::Opener;
 use crate::Error;
-use crate::Pins;
-use crate::child;
-use crate::inspect;
+use crate::foreign::Foreign;
+use crate::process::child;
 use std::collections::BTreeMap;
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::path::{Path, PathBuf};
@@ -64,7 +65,7 @@ pub struct SearchPath {
 }
 
 /// The program's own folders, by where it is: a link to the program is followed.
-pub(crate) fn of_program() -> Vec<Place> {
+fn of_program() -> Vec<Place> {
     let program = child::program().ok();
     let program = program.map(|program| program.canonicalize().unwrap_or(program));
     let Some(folder) = program.as_deref().and_then(Path::parent) else {
@@ -85,6 +86,18 @@ pub(crate) fn of_program() -> Vec<Place> {
         })
     })
     .collect()
+}
+
+impl Library {
+    /// Whether it lies where the program's own laws do.
+    pub fn is_beside_program(&self) -> bool {
+        let folder = self.path.parent().map(Path::canonicalize);
+        let Some(Ok(folder)) = folder else {
+            return false;
+        };
+        let mut own = of_program().into_iter();
+        own.any(|own| own.folder.canonicalize().is_ok_and(|own| own == folder))
+    }
 }
 
 impl SearchPath {

@@ -4,15 +4,13 @@
 mod suppliers;
 
 use crate::Error;
-use crate::adapter::{self, Adapter};
-use crate::hexadecimal_sha256;
+use crate::foreign::{self, Adapter};
+use crate::needs::needs;
+use crate::process::library_bytes::hexadecimal_sha256;
 use abi::raw::{self, MagicBlock};
 use abi::version;
-use object::read::elf::{Dyn, ElfFile, FileHeader};
-use object::read::macho::{MachHeader, MachOFile};
-use object::read::pe::{ImageNtHeaders, PeFile};
-use object::{Architecture, BinaryFormat, File, LittleEndian, Object, ObjectSection, ObjectSymbol};
-use object::{ReadRef, SymbolKind, elf};
+use object::{Architecture, BinaryFormat, File, Object, ObjectSection, ObjectSymbol};
+use object::{ReadRef, SymbolKind};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::fmt::{self, Write as _};
@@ -151,8 +149,8 @@ impl Inspection {
     /// Whether it is a user subroutine of Abaqus, and no library of the contract.
     pub fn is_umat(&self) -> bool {
         let has = |name: &str| self.exported.iter().any(|other| other == name);
-        let exports = || adapter::UMAT_SYMBOLS.into_iter().any(has);
-        self.handshake.is_none() && (exports() || adapter::sidecar_of(&self.path).is_some())
+        let exports = || foreign::UMAT_SYMBOLS.into_iter().any(has);
+        self.handshake.is_none() && (exports() || foreign::sidecar_of(&self.path).is_some())
     }
 
     /// The program it is made for, if it is no library of the contract and that can be seen from outside.
@@ -221,7 +219,7 @@ impl Inspection {
             remarks.push(format!("it is no shared library: {:?}", file.kind()));
         }
         match &self.handshake {
-            None if self.is_umat() => remarks.push(match adapter::sidecar_of(&self.path) {
+            None if self.is_umat() => remarks.push(match foreign::sidecar_of(&self.path) {
                 Some(sidecar) => {
                     format!(
                         "a user subroutine of Abaqus, with the sidecar {}",
@@ -345,16 +343,6 @@ fn wrapped(names: &[String]) -> String {
     text
 }
 
-/// Reads the libraries that an ELF file needs, and those that these need; those that are not found are passed over.
-#[cfg(target_os = "linux")]
-pub(crate) fn each_supplier(path: &Path, bytes: &[u8], mut look: impl FnMut(&[u8])) {
-    let file = File::parse(bytes).ok();
-    let wanted = file.and_then(|file| needs(&file, bytes).ok());
-    if let Some((needs, search)) = wanted {
-        suppliers::each(path, (&needs, &search), |_, bytes| look(bytes));
-    }
-}
-
 /// The name that Rust's target names use.
 fn architecture(architecture: Architecture) -> String {
     match architecture {
@@ -472,71 +460,6 @@ fn symbols(file: &File<'_>) -> object::Result<(Vec<String>, Vec<String>)> {
         exported.into_iter().collect(),
         undefined.into_iter().collect(),
     ))
-}
-
-/// Libraries that a file needs, and folders in which it wants them looked for.
-fn needs(file: &File<'_>, bytes: &[u8]) -> object::Result<(Vec<String>, Vec<String>)> {
-    match file {
-        File::Elf32(elf) => elf_needs(elf, bytes),
-        File::Elf64(elf) => elf_needs(elf, bytes),
-        File::MachO32(macho) => macho_needs(macho),
-        File::MachO64(macho) => macho_needs(macho),
-        File::Pe32(pe) => pe_needs(pe),
-        File::Pe64(pe) => pe_needs(pe),
-        _ => Ok(Default::default()),
-    }
-}
-
-fn elf_needs<Elf: FileHeader>(
-    file: &ElfFile<'_, Elf>,
-    bytes: &[u8],
-) -> object::Result<(Vec<String>, Vec<String>)> {
-    let endian = file.endian();
-    let sections = file.elf_section_table();
-    let (mut needs, mut search) = (Vec::new(), Vec::new());
-    let Some((entries, strings)) = sections.dynamic(endian, bytes)? else {
-        return Ok((needs, search));
-    };
-    let strings = sections.strings(endian, bytes, strings)?;
-    for entry in entries {
-        let list = match entry.tag32(endian) {
-            Some(elf::DT_NEEDED) => &mut needs,
-            Some(elf::DT_RPATH | elf::DT_RUNPATH) => &mut search,
-            _ => continue,
-        };
-        let text = String::from_utf8_lossy(entry.string(endian, strings)?);
-        list.extend(text.split(':').map(str::to_owned));
-    }
-    Ok((needs, search))
-}
-
-fn macho_needs<Mach: MachHeader>(
-    file: &MachOFile<'_, Mach>,
-) -> object::Result<(Vec<String>, Vec<String>)> {
-    let endian = file.endian();
-    let mut needs = Vec::new();
-    let mut commands = file.macho_load_commands()?;
-    while let Some(command) = commands.next()? {
-        if let Some(library) = command.dylib()? {
-            let name = command.string(endian, library.dylib.name)?;
-            needs.push(String::from_utf8_lossy(name).into_owned());
-        }
-    }
-    Ok((needs, Vec::new()))
-}
-
-fn pe_needs<Pe: ImageNtHeaders>(
-    file: &PeFile<'_, Pe>,
-) -> object::Result<(Vec<String>, Vec<String>)> {
-    let mut needs = Vec::new();
-    if let Some(table) = file.import_table()? {
-        let mut libraries = table.descriptors()?;
-        while let Some(library) = libraries.next()? {
-            let name = table.name(library.name.get(LittleEndian))?;
-            needs.push(String::from_utf8_lossy(name).into_owned());
-        }
-    }
-    Ok((needs, Vec::new()))
 }
 
 /// The inspection as JSON.

@@ -1,14 +1,16 @@
 //! Opening libraries: whom to trust, what to record, what is open already.
 
-use crate::adapter::{self, Adapter, Foreign, ForeignLaw};
+use super::opened::{Library, OpenedLaw, Stamp};
+use crate::foreign::{self, Adapter, Fault, Foreign};
+use crate::instance::Described;
 #[cfg(unix)]
-use crate::isolate;
-use crate::library_bytes::Image;
-use crate::open_library::Origin;
-use crate::{Error, LawDescription, Library, Trust, child, library, trial};
+use crate::process::isolate::Workers;
+use crate::process::library_bytes::Image;
+use crate::process::trust::Trust;
+use crate::process::{child, vetting};
+use crate::{Error, library};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::SystemTime;
 
 /// Settings for opening libraries. The program makes one and hands it down; two of them know nothing
 /// of each other. Copies share what is opened.
@@ -21,9 +23,6 @@ pub struct Opener {
     /// Equal bytes are opened once, wherever they lie.
     opened: Arc<Mutex<Vec<Arc<Library>>>>,
 }
-
-/// What changes with a file's contents. A file with an equal stamp is not hashed again.
-pub(crate) type Stamp = (u64, SystemTime);
 
 fn stamp(path: &Path) -> Option<Stamp> {
     let metadata = path.metadata().ok()?;
@@ -92,7 +91,10 @@ impl Opener {
         approve(&image.sha256)?;
         let sha256 = image.sha256.clone();
         let warnings = std::mem::take(&mut image.warnings);
-        let same = opened.iter().find(|library| library.sha256 == sha256);
+        // Workers open the library where it lies.
+        let is_shared = self.trust().isolate.is_none();
+        let mut same = opened.iter().filter(|_| is_shared);
+        let same = same.find(|library| library.sha256 == sha256);
         let laws = if let Some(library) = same {
             library.laws.clone()
         } else {
@@ -106,26 +108,26 @@ impl Opener {
             laws,
             sidecar: None,
             foreign: None,
-            call_limit: self.trust().isolate,
         });
         opened.push(Arc::clone(&library));
         Ok(library)
     }
 
     /// Opens the library in this process, after it was tried in another, or asks a worker.
-    fn laws_of(&self, path: &Path, image: Image) -> Result<Vec<(LawDescription, Origin)>, Error> {
+    fn laws_of(&self, path: &Path, image: Image) -> Result<Vec<OpenedLaw>, Error> {
         let unusable = |why| Error::library(format!("library {}: {why}", path.display()));
         let trust = self.trust();
         #[cfg(unix)]
-        if trust.isolate.is_some() {
-            return isolate::describe(path, &image.sha256, None).map_err(unusable);
+        if let Some(limit) = trust.isolate {
+            let workers = Workers::of(path, &image.sha256, None, Some(limit));
+            let laws = workers.laws(false).map_err(unusable)?.into_iter();
+            return Ok(laws.map(OpenedLaw::new).collect());
         }
         if trust.probe {
-            trial::vet(path, &image.sha256)?;
+            vetting::vet(path, &image.sha256)?;
         }
-        let laws = library::open(path, image).map_err(unusable)?.laws;
-        let here = |(law, handle)| (law, Origin::Here(handle));
-        Ok(laws.into_iter().map(here).collect())
+        let laws = library::open(path, image).map_err(unusable)?;
+        Ok(laws.into_iter().map(OpenedLaw::here).collect())
     }
 
     /// Opens a library that is made for another program, if its SHA-256 is approved. Its code runs
@@ -147,48 +149,52 @@ impl Opener {
                 "can only run in this process here: `in_process = true`".to_owned(),
             ));
         }
-        let foreign = &self.completed(foreign);
-        let call_limit = self.trust().isolate;
-        #[cfg(unix)]
-        let apart = !foreign.in_process || call_limit.is_some();
-        // What describes a UDSM is code of its own.
-        #[cfg(unix)]
-        let described = (apart && foreign.adapter == Adapter::Udsm)
-            .then(|| isolate::describe(path, &image.sha256, Some(foreign)))
-            .transpose()
-            .map_err(|why| Error::library(format!("library {}: {why}", path.display())))?;
-        #[cfg(not(unix))]
-        let described = None;
-        let mut foreign = foreign.clone();
-        let (laws, sidecar) = if let Some(laws) = described {
-            (laws, None)
-        } else {
-            let opened = adapter::open(&foreign, &image)?;
-            let (externals, scratch) = opened.wishes;
-            foreign.externals = foreign.externals.or(externals);
-            foreign.scratch = foreign.scratch.or(scratch);
-            let origin = |law: Arc<dyn ForeignLaw>| {
-                #[cfg(unix)]
-                if apart {
-                    let is_serial = law.is_serial();
-                    return Origin::Apart { is_serial };
-                }
-                Origin::Foreign(law)
-            };
-            let laws = opened.laws.into_iter();
-            let laws = laws.map(|(description, law)| (description, origin(law)));
-            (laws.collect(), opened.sidecar)
-        };
+        let mut foreign = self.completed(foreign);
+        let (laws, sidecar) = self.foreign_laws(&mut foreign, &image)?;
         Ok(Arc::new(Library {
             path: path.clone(),
             warnings: std::mem::take(&mut image.warnings),
             sha256: image.sha256.clone(),
             stamp: None,
-            laws,
+            laws: laws.into_iter().map(OpenedLaw::new).collect(),
             sidecar,
             foreign: Some(foreign),
-            call_limit,
         }))
+    }
+
+    /// The laws of a foreign library, in this process or in workers, and the hash of its sidecar. What the sidecar says
+    /// becomes part of how the library is named.
+    fn foreign_laws(
+        &self,
+        foreign: &mut Foreign,
+        image: &Image,
+    ) -> Result<(Described, Option<String>), Error> {
+        let path = foreign.library.clone();
+        let unusable = |why| Error::library(format!("library {}: {why}", path.display()));
+        let limit = self.trust().isolate;
+        let is_apart = cfg!(unix) && (!foreign.in_process || limit.is_some());
+        // What describes a UDSM is code of its own.
+        #[cfg(unix)]
+        if is_apart && foreign.adapter == Adapter::Udsm {
+            let workers = Workers::of(&path, &image.sha256, Some(foreign), limit);
+            return Ok((workers.laws(true).map_err(unusable)?, None));
+        }
+        let opened = foreign::open(foreign, image).map_err(|fault| match fault {
+            Fault::Library(why) => unusable(why),
+            Fault::Other(error) => error,
+        })?;
+        let (externals, scratch) = opened.wishes;
+        foreign.externals = foreign.externals.or(externals);
+        foreign.scratch = foreign.scratch.or(scratch);
+        let mut laws = opened.laws;
+        #[cfg(unix)]
+        if is_apart {
+            let workers = Workers::of(&path, &image.sha256, Some(foreign), limit);
+            for (number, (law, source)) in laws.iter_mut().enumerate() {
+                *source = workers.law(number, &law.id, source.is_serial());
+            }
+        }
+        Ok((laws, opened.sidecar))
     }
 
     /// As a file names it, and with what was asked for next to it.
@@ -209,15 +215,8 @@ mod tests {
 
     fn umat(record: Option<&str>) -> Foreign {
         Foreign {
-            adapter: Adapter::Umat,
-            library: PathBuf::from("law.so"),
-            sidecar: None,
-            in_process: false,
             record: record.map(PathBuf::from),
-            records_once: false,
-            externals: None,
-            scratch: None,
-            tangent_order: None,
+            ..Foreign::umat(Path::new("law.so"))
         }
     }
 

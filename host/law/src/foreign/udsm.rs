@@ -9,22 +9,18 @@
 
 use super::guarded::{Argument, Block as Guarded, Blocks, Kind, Role};
 use super::sidecar::is_column;
-use super::{
-    Externals, Foreign, ForeignInstance, ForeignLaw, ForeignLaws, Order, PointEnd, PointStart,
-    Refusal, each_point, time_of_call,
-};
-use crate::Error;
+use super::{Externals, Foreign, ForeignLaws, Order, Refusal, each_point, time_of_call};
+use crate::call::{Batch, End, Operator, Request, Start};
 use crate::description::{
-    Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription, Tangent,
+    FormulationDescription, InternalVariable, LawDescription, ParameterDescription, Tangent,
 };
-use crate::library::udsm::{N_ARGUMENTS, Routine};
-use crate::library::{Call, CallFailure};
-use crate::library_bytes::Image;
+use crate::instance::{Answer, Described, Instance, Source};
+use crate::library::routine::{N_UDSM, Udsm as Routine};
+use crate::process::library_bytes::Image;
 use abi::Hypothesis;
-use abi::raw::{self, Status};
+use abi::raw;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 /// Entries of Props, Sig0 and dEps, whatever the model.
 const N_PROPS: usize = 50;
@@ -38,8 +34,6 @@ const PLACE: [usize; N] = [0, 1, 2, 3, 5, 4];
 /// Most models and state variables that are plausible.
 const MOST_MODELS: i32 = 200;
 const MOST_STATES: i32 = 1000;
-/// Stress along the axes that a plane problem lacks, relative to the largest, that is rounding.
-const OUT_OF_PLANE: f64 = 1e-9;
 
 /// Tasks of `User_Mod`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,14 +62,14 @@ impl From<A> for usize {
     }
 }
 
-type Block = Guarded<N_ARGUMENTS>;
+type Block = Guarded<N_UDSM>;
 
 use Kind::{Integer as I, Real as R};
 use Role::{Array as W, Copy as C, Fixed as F, Output as O};
 
 /// Name, kind and role.
 #[rustfmt::skip]
-static ARGUMENTS: [Argument; N_ARGUMENTS] = [
+static ARGUMENTS: [Argument; N_UDSM] = [
     ("IDTask", I, F), ("iMod", I, F), ("IsUndr", I, F), ("iStep", I, F), ("iTer", I, F), ("iEl", I, F),
     ("Int", I, F), ("X", R, C), ("Y", R, C), ("Z", R, C), ("Time0", R, C), ("dTime", R, C),
     ("Props", R, F), ("Sig0", R, C), ("Swp0", R, C), ("StVar0", R, W), ("dEps", R, C), ("D", R, W),
@@ -87,52 +81,42 @@ static ARGUMENTS: [Argument; N_ARGUMENTS] = [
 /// Asks a library for its models. Its functions run.
 ///
 /// # Errors
-/// [`Error::Library`] with what it lacks.
-pub(super) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Error> {
-    let path = &foreign.library;
-    let fault = |why: String| Error::library(format!("library {}: {why}", path.display()));
+/// What it lacks, in words.
+pub(super) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, String> {
     let traps = foreign.externals == Some(Externals::Trap);
-    let sha256 = &image.sha256;
-    let routine = open_again(path, sha256, traps).map_err(fault)?;
+    let routine = open_again(&foreign.library, &image.sha256, traps)?;
     let n_models = routine.n_models().unwrap_or(1);
     if !(1..=MOST_MODELS).contains(&n_models) {
-        return Err(fault(format!("it says that it has {n_models} models")));
+        return Err(format!("it says that it has {n_models} models"));
     }
-    let mut laws: Vec<(LawDescription, Arc<dyn ForeignLaw>)> = Vec::new();
+    let mut laws = Described::new();
     for model in 1..=n_models {
-        let (law, n_states) = describe(routine, model).map_err(fault)?;
+        let law = describe(routine, model)?;
         if laws.iter().any(|(other, _)| other.id == law.id) {
-            return Err(fault(format!("two of its models are called `{}`", law.id)));
+            return Err(format!("two of its models are called `{}`", law.id));
         }
         let udsm = Udsm {
-            library: path.clone(),
-            sha256: sha256.clone(),
+            library: foreign.library.clone(),
+            sha256: image.sha256.clone(),
             traps,
             order: foreign.tangent_order.unwrap_or_default(),
             model,
-            n_states,
-            time_dependent: law.formulations.iter().any(|f| f.time_dependent),
         };
         laws.push((law, Arc::new(udsm)));
     }
     Ok(ForeignLaws {
         laws,
-        sidecar: None,
-        wishes: (None, None),
+        ..ForeignLaws::default()
     })
 }
 
 /// The routine in its own image, of a file that has not changed.
 fn open_again(path: &Path, sha256: &str, traps: bool) -> Result<Routine, String> {
-    let image = Image::read(path)?;
-    if image.sha256 != sha256 {
-        return Err("it was changed".to_owned());
-    }
-    Routine::open(path, image, traps)
+    Routine::open(path, Image::again(path, sha256)?, traps)
 }
 
-/// What a model says of itself, and its number of state variables.
-fn describe(routine: Routine, model: i32) -> Result<(LawDescription, usize), String> {
+/// What a model says of itself.
+fn describe(routine: Routine, model: i32) -> Result<LawDescription, String> {
     let name = routine.model_name(model);
     let name = name.map_or(String::new(), |name| readable(&name));
     let id = identifier(&name, &format!("model_{model}"));
@@ -157,11 +141,7 @@ fn describe(routine: Routine, model: i32) -> Result<(LawDescription, usize), Str
             doc: format!("Parameter {number}, {symbol}"),
             symbol,
             unit: unit(&text("GetParamUnit", number)),
-            default: None,
-            optional: false,
-            bounds: ANY,
-            usual: ANY,
-            choices: Vec::new(),
+            ..ParameterDescription::default()
         });
     }
     let block = asked(routine, model, Task::CountStates)?;
@@ -194,8 +174,7 @@ fn describe(routine: Routine, model: i32) -> Result<(LawDescription, usize), Str
             doc: format!("State variable {number}, {symbol}"),
             symbol,
             unit: unit(&text("GetStateVarUnit", number)),
-            initial_value: 0.0,
-            output_only: false,
+            ..InternalVariable::default()
         });
     }
     let attributes = asked(routine, model, Task::Attributes)?;
@@ -209,38 +188,25 @@ fn describe(routine: Routine, model: i32) -> Result<(LawDescription, usize), Str
         hypothesis: hypothesis.name(),
         index,
         symmetric: attributes.integer(A::NonSym) == 0,
-        linear: false,
         tangent: if attributes.integer(A::ITang) == 1 {
             Tangent::Consistent
         } else {
             Tangent::Approximate
         },
-        rates: false,
         time_dependent: attributes.integer(A::ITimeDep) != 0,
-        local_axes: false,
         internal_variables: internal_variables.clone(),
+        ..FormulationDescription::default()
     };
     let law = LawDescription {
-        name: if name.is_empty() { id.clone() } else { name },
+        name,
         id,
-        version: "unversioned".to_owned(),
-        author: "unknown".to_owned(),
-        licence: "unknown licence".to_owned(),
         doc: format!("User-defined soil model {model} of its library."),
-        references: "none given".to_owned(),
         parameters,
         formulations: formulations.map(formulation).collect(),
+        ..LawDescription::default()
     };
-    Ok((law, n_states as usize))
+    Ok(law.completed())
 }
-
-/// Any value.
-const ANY: Bounds = Bounds {
-    lower: f64::NEG_INFINITY,
-    open_lower: false,
-    upper: f64::INFINITY,
-    open_upper: false,
-};
 
 /// The answer to a task that is not about a point.
 fn asked(routine: Routine, model: i32, task: Task) -> Result<Block, String> {
@@ -334,12 +300,9 @@ struct Udsm {
     traps: bool,
     order: Order,
     model: i32,
-    n_states: usize,
-    /// Its response depends on the time.
-    time_dependent: bool,
 }
 
-impl ForeignLaw for Udsm {
+impl Source for Udsm {
     fn is_serial(&self) -> bool {
         true
     }
@@ -347,26 +310,25 @@ impl ForeignLaw for Udsm {
     fn create(
         &self,
         hypothesis: Hypothesis,
+        formulation: &FormulationDescription,
         parameters: &[f64],
-    ) -> Result<Box<dyn ForeignInstance>, CallFailure> {
-        let unusable = |why: String| (raw::PILUM_E_INTERNAL, why);
-        let routine = open_again(&self.library, &self.sha256, self.traps).map_err(unusable)?;
-        Ok(Box::new(Instance {
-            routine,
-            blocks: Blocks::new(template(self.model, self.n_states, parameters)),
+    ) -> Result<Box<dyn Instance>, Answer> {
+        let routine = open_again(&self.library, &self.sha256, self.traps);
+        let n_states = formulation.internal_variables.len();
+        Ok(Box::new(Material {
+            routine: routine.map_err(|why| (raw::PILUM_E_INTERNAL, why))?,
+            blocks: Blocks::new(template(self.model, n_states, parameters), true),
             n: hypothesis.n_components(),
+            n_states,
             order: self.order,
-            time_dependent: self.time_dependent,
-            turn: Mutex::default(),
-            overwritten: AtomicU64::new(0),
-            told: AtomicU64::new(0),
+            time_dependent: formulation.time_dependent,
         }))
     }
 }
 
 /// Data common to all calls of a material.
 fn template(model: i32, n_states: usize, parameters: &[f64]) -> Block {
-    let mut entries = [1; N_ARGUMENTS];
+    let mut entries = [1; N_UDSM];
     for (argument, count) in [
         (A::Props, N_PROPS),
         (A::Sig0, N_SIG0),
@@ -395,47 +357,30 @@ fn template(model: i32, n_states: usize, parameters: &[f64]) -> Block {
 
 /// A model with its parameters fixed.
 #[derive(Debug)]
-struct Instance {
+struct Material {
     routine: Routine,
-    blocks: Blocks<N_ARGUMENTS>,
+    blocks: Blocks<N_UDSM>,
     /// Components of the hypothesis.
     n: usize,
+    n_states: usize,
     /// How D is in memory.
     order: Order,
     time_dependent: bool,
-    /// Whose turn it is: routines keep variables.
-    turn: Mutex<()>,
-    /// Copies that the routine has overwritten, by bits, and those that have been reported.
-    overwritten: AtomicU64,
-    told: AtomicU64,
 }
 
-impl ForeignInstance for Instance {
-    fn init_state(&self, call: Call<'_>) -> Option<(Status, String)> {
-        let _turn = self.turn.lock().unwrap_or_else(PoisonError::into_inner);
-        // No gradients, no state at the start: an increment of nothing.
-        let zeros = vec![0.0; call.state1.len()];
-        let call = Call {
-            state0: &zeros,
-            ..call
+impl Instance for Material {
+    fn call(&self, request: Request, batch: Batch<'_, '_>) -> Option<Answer> {
+        let operator = match request {
+            Request::InitialState => Operator::None,
+            Request::Update(operator) => operator,
         };
+        let sizes = (self.n, self.n_states, operator.n_entries(self.n));
         Some(self.blocks.with(|block| {
-            each_point(call, |start, end| {
-                self.fill(block, start, Task::Initialise);
-                self.call(block)?;
-                finite(block, A::StVar0, true)?;
-                for (to, value) in end.state.iter_mut().zip(block.reals(A::StVar0)) {
-                    *to = value;
-                }
-                Ok(())
+            each_point(sizes, batch, |start, end| match request {
+                Request::InitialState => self.initialise(block, start, end),
+                Request::Update(_) => self.update(block, operator, start, end),
             })
         }))
-    }
-
-    fn integrate(&self, call: Call<'_>) -> (Status, String) {
-        let _turn = self.turn.lock().unwrap_or_else(PoisonError::into_inner);
-        self.blocks
-            .with(|block| each_point(call, |start, end| self.update(block, start, end)))
     }
 
     fn put_beside(&self, gap: Option<usize>, value: Option<f64>) -> Option<String> {
@@ -443,30 +388,43 @@ impl ForeignInstance for Instance {
     }
 
     fn take_overwritten(&self) -> Vec<String> {
-        let overwritten = self.overwritten.load(Ordering::Relaxed);
-        let told = self.told.swap(overwritten, Ordering::Relaxed);
-        let new = (0..N_ARGUMENTS).filter(|i| (overwritten & !told) >> i & 1 == 1);
-        new.map(|i| ARGUMENTS[i].0.to_owned()).collect()
+        self.blocks.take_overwritten()
     }
 }
 
-impl Instance {
+impl Material {
+    /// State variables of a stress: an increment of nothing, as there are no strains and no state.
+    fn initialise(
+        &self,
+        block: &mut Block,
+        start: &Start<'_>,
+        end: &mut End<'_>,
+    ) -> Result<(), Refusal> {
+        self.fill(block, start, Task::Initialise);
+        self.ask(block)?;
+        block.finite(&[A::StVar0], true)?;
+        let state = end.state.iter_mut();
+        state
+            .zip(block.reals(A::StVar0))
+            .for_each(|(to, v)| *to = v);
+        Ok(())
+    }
+
     fn update(
         &self,
         block: &mut Block,
-        start: &PointStart<'_>,
-        end: &mut PointEnd<'_>,
+        operator: Operator,
+        start: &Start<'_>,
+        end: &mut End<'_>,
     ) -> Result<(), Refusal> {
-        let is_at_rest = start.gradient == start.gradient_end;
+        let is_at_rest = start.gradient.0 == start.gradient_end.0;
         self.fill(block, start, Task::Stresses);
-        self.call(block)?;
-        finite(block, A::Sig, is_at_rest)?;
-        finite(block, A::StVar, is_at_rest)?;
+        self.ask(block)?;
+        block.finite(&[A::Sig, A::StVar], is_at_rest)?;
         let stress: Vec<f64> = block.reals(A::Sig).collect();
         let state: Vec<f64> = block.reals(A::StVar).collect();
-        let largest = stress.iter().fold(0.0_f64, |max, v| max.max(v.abs()));
-        let mut rest = PLACE[self.n..].iter().map(|place| stress[*place]);
-        if let Some(stress) = rest.find(|v| v.abs() > OUT_OF_PLANE * largest) {
+        let missing = PLACE[self.n..].iter().copied();
+        if let Some(stress) = block.out_of_plane(A::Sig, missing) {
             return Err(Refusal::error(
                 raw::PILUM_E_UNSUPPORTED,
                 format!(
@@ -476,55 +434,48 @@ impl Instance {
                 ),
             ));
         }
-        for (to, place) in end.flux.iter_mut().zip(PLACE) {
+        for (to, place) in end.flux.0.iter_mut().zip(PLACE) {
             *to = stress[place];
         }
         end.state.copy_from_slice(&state);
-        if end.operator.is_empty() {
-            return Ok(());
-        }
-        let is_elastic = start.request & raw::PILUM_REQ_ELASTIC != 0;
-        let task = if is_elastic {
-            Task::ElasticStiffness
-        } else {
-            Task::Stiffness
+        let task = match operator {
+            Operator::None => return Ok(()),
+            Operator::Consistent => Task::Stiffness,
+            Operator::Elastic => Task::ElasticStiffness,
         };
         self.fill(block, start, task);
-        if !is_elastic {
+        if task == Task::Stiffness {
             // The end that has just been found.
             block.set(A::Sig, &stress);
             block.set(A::StVar, &state);
         }
-        let asked = block.clone();
-        self.call(block)?;
-        if block.reals(A::D).all(|entry| entry == 0.0) {
-            // No stiffness, or no word about it: what is not written shows.
-            block.refresh(&asked);
-            block.set(A::D, &[f64::NAN; N * N]);
-            self.call(block)?;
-            if block.reals(A::D).all(f64::is_nan) {
-                let message = format!("the routine leaves D unwritten in task {}", task as i32);
-                return Err(Refusal::error(raw::PILUM_E_INTERNAL, message));
-            }
-            block.refresh(&asked);
-            self.call(block)?;
-        }
-        finite(block, A::D, is_at_rest)?;
-        let stiffness: Vec<f64> = block.reals(A::D).collect();
-        for i in 0..self.n {
-            for j in 0..self.n {
-                let entry = match self.order {
-                    Order::Columns => PLACE[i] + PLACE[j] * N,
-                    Order::Rows => PLACE[i] * N + PLACE[j],
-                };
-                end.operator[i * self.n + j] = stiffness[entry];
-            }
-        }
+        self.stiffness(block, task)?;
+        block.finite(&[A::D], is_at_rest)?;
+        block.read_matrix(A::D, self.order, &PLACE[..self.n], end.operator);
         Ok(())
     }
 
+    /// Has D written, and sees whether it is.
+    fn stiffness(&self, block: &mut Block, task: Task) -> Result<(), Refusal> {
+        let asked = block.clone();
+        self.ask(block)?;
+        if block.reals(A::D).any(|entry| entry != 0.0) {
+            return Ok(());
+        }
+        // No stiffness, or no word about it: what is not written shows.
+        block.refresh(&asked);
+        block.set(A::D, &[f64::NAN; N * N]);
+        self.ask(block)?;
+        if block.reals(A::D).all(f64::is_nan) {
+            let message = format!("the routine leaves D unwritten in task {}", task as i32);
+            return Err(Refusal::error(raw::PILUM_E_INTERNAL, message));
+        }
+        block.refresh(&asked);
+        self.ask(block)
+    }
+
     /// Fresh arguments.
-    fn fill(&self, block: &mut Block, start: &PointStart<'_>, task: Task) {
+    fn fill(&self, block: &mut Block, start: &Start<'_>, task: Task) {
         block.refresh(self.blocks.template());
         let six = |values: &[f64]| {
             let mut six = [0.0; N];
@@ -533,8 +484,9 @@ impl Instance {
             }
             six
         };
-        let (stress, strain) = (six(start.flux), six(start.gradient));
-        let strain_end = six(start.gradient_end);
+        let (stress, strain) = (six(start.flux.0), six(start.gradient.0));
+        let strain_end = six(start.gradient_end.0);
+        let site = start.site(0);
         let mut increments = [0.0; N_DEPS];
         for c in 0..N {
             increments[c] = strain_end[c] - strain[c];
@@ -543,9 +495,9 @@ impl Instance {
         block.set_integers(A::IdTask, &[task as i32]);
         block.set_integers(A::IsUndr, &[i32::from(start.moment.is_undrained)]);
         block.set_integers(A::IStep, &[start.moment.increment as i32]);
-        block.set_integers(A::IEl, &[start.site.element as i32]);
-        block.set_integers(A::Int, &[start.site.point as i32]);
-        let [x, y] = start.site.position;
+        block.set_integers(A::IEl, &[site.element as i32]);
+        block.set_integers(A::Int, &[site.point as i32]);
+        let [x, y] = site.position;
         block.set(A::X, &[x]);
         block.set(A::Y, &[y]);
         block.set(A::Time0, &[start.time]);
@@ -564,13 +516,10 @@ impl Instance {
     }
 
     /// One call.
-    fn call(&self, block: &mut Block) -> Result<(), Refusal> {
+    fn ask(&self, block: &mut Block) -> Result<(), Refusal> {
         block.hand_over();
         self.routine.call(&mut block.words, &block.at);
-        let overwritten = block.overwritten()?;
-        if overwritten != 0 {
-            self.overwritten.fetch_or(overwritten, Ordering::Relaxed);
-        }
+        self.blocks.returned(block)?;
         let abort = block.integer(A::IAbort);
         if abort == 0 {
             return Ok(());
@@ -588,21 +537,6 @@ impl Instance {
             message: format!("the routine ends task {task} with iAbort = {abort}"),
         })
     }
-}
-
-/// NaNs call for a smaller increment, unless there is no increment.
-fn finite(block: &Block, result: A, is_at_rest: bool) -> Result<(), Refusal> {
-    if block.reals(result).all(f64::is_finite) {
-        return Ok(());
-    }
-    let name = ARGUMENTS[result as usize].0;
-    let (status, when) = if is_at_rest {
-        (raw::PILUM_E_INTERNAL, ", without any strain")
-    } else {
-        (raw::PILUM_E_NUMERIC, "")
-    };
-    let message = format!("the routine leaves {name} with values that are not finite{when}");
-    Err(Refusal::error(status, message))
 }
 
 #[cfg(test)]

@@ -5,8 +5,8 @@
 //! Writing costs a few nanoseconds for a call with a whole batch of points. Without a watcher there
 //! is nothing to write to.
 
-use super::Moment;
-use super::library::SharedMemory;
+use crate::call::Moment;
+use crate::library::SharedMemory;
 use std::cell::Cell;
 use std::fmt::Write as _;
 use std::sync::atomic::{AtomicUsize, Ordering};

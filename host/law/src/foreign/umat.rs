@@ -5,20 +5,19 @@
 
 use super::guarded::{Argument, Block as Guarded, Blocks, Kind, Role};
 use super::sidecar::Sidecar;
-use super::{
-    Externals, Foreign, ForeignInstance, ForeignLaw, ForeignLaws, Order, PointEnd, PointStart,
-    Refusal, each_point, time_of_call,
-};
+use super::{Externals, Foreign, ForeignLaws, Order, Refusal, each_point, time_of_call};
 use crate::Error;
-use crate::library::umat::{N_ARGUMENTS, Routine};
-use crate::library::{Call, CallFailure};
-use crate::library_bytes::Image;
+use crate::call::{Batch, End, Operator, Request, Start};
+use crate::description::FormulationDescription;
+use crate::instance::{Answer, Instance, Source};
+use crate::library::routine::{N_UMAT, Umat as Routine};
+use crate::process::library_bytes::Image;
 use abi::Hypothesis;
-use abi::raw::{self, Status};
+use abi::raw;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Names by which compilers know the routine, in the order in which they are looked for.
 pub const SYMBOLS: [&str; 4] = ["umat_", "umat", "UMAT", "UMAT_"];
@@ -26,8 +25,6 @@ pub const SYMBOLS: [&str; 4] = ["umat_", "umat", "UMAT", "UMAT_"];
 const N_CMNAME: usize = 80;
 /// Words of PREDEF and DPRED: no predefined fields, but room to read.
 const N_FIELDS: usize = 8;
-/// Stress along the axes that a plane problem lacks, relative to the largest, that is rounding.
-const OUT_OF_PLANE: f64 = 1e-9;
 
 /// The arguments in their order.
 #[rustfmt::skip]
@@ -45,13 +42,13 @@ impl From<A> for usize {
     }
 }
 
-type Block = Guarded<N_ARGUMENTS>;
+type Block = Guarded<N_UMAT>;
 
 use Role::{Array as R, Copy as C, Fixed as F, Output as O};
 
 /// Name, kind and role.
 #[rustfmt::skip]
-static ARGUMENTS: [Argument; N_ARGUMENTS] = [
+static ARGUMENTS: [Argument; N_UMAT] = [
     ("STRESS", Kind::Real, R), ("STATEV", Kind::Real, R), ("DDSDDE", Kind::Real, R),
     ("SSE", Kind::Real, O), ("SPD", Kind::Real, O), ("SCD", Kind::Real, O),
     ("RPL", Kind::Real, O), ("DDSDDT", Kind::Real, O), ("DRPLDE", Kind::Real, O),
@@ -103,7 +100,7 @@ struct Umat {
     sidecar: Sidecar,
 }
 
-impl ForeignLaw for Umat {
+impl Source for Umat {
     fn is_serial(&self) -> bool {
         // What is recorded is one call.
         !self.sidecar.is_thread_safe || self.record.is_some()
@@ -112,43 +109,32 @@ impl ForeignLaw for Umat {
     fn create(
         &self,
         hypothesis: Hypothesis,
+        formulation: &FormulationDescription,
         parameters: &[f64],
-    ) -> Result<Box<dyn ForeignInstance>, CallFailure> {
-        let unusable = |why: String| (raw::PILUM_E_INTERNAL, why);
-        let formulations = &self.sidecar.law.formulations;
-        let number = formulations
-            .iter()
-            .position(|f| f.hypothesis == hypothesis.name())
-            .ok_or_else(|| unusable("the hypothesis is not offered".to_owned()))?;
-        let image = Image::read(&self.library).map_err(unusable)?;
-        if image.sha256 != self.sha256 {
-            return Err(unusable("it was changed".to_owned()));
-        }
+    ) -> Result<Box<dyn Instance>, Answer> {
         let names: Vec<&str> = match &self.sidecar.symbol {
             Some(name) => vec![name],
             None => SYMBOLS.to_vec(),
         };
-        let routine = Routine::open(&self.library, image, &names, self.traps).map_err(unusable)?;
+        let open = |image| Routine::open(&self.library, image, &names, self.traps);
+        let routine = Image::again(&self.library, &self.sha256).and_then(open);
         let sizes = Sizes {
             n: hypothesis.n_components(),
-            n_tens: self.sidecar.ntens[number],
+            n_tens: self.sidecar.ntens[formulation.index as usize],
             n_normal: if hypothesis.is_interface() { 1 } else { 3 },
-            n_states: formulations[number].internal_variables.len(),
+            n_states: formulation.internal_variables.len(),
             n_props: parameters.len(),
         };
-        let is_recorded = AtomicBool::new(self.record.is_none());
-        Ok(Box::new(Instance {
-            routine,
-            blocks: Blocks::new(template(sizes, &self.sidecar.cmname, parameters)),
+        let template = template(sizes, &self.sidecar.cmname, parameters);
+        Ok(Box::new(Material {
+            routine: routine.map_err(|why| (raw::PILUM_E_INTERNAL, why))?,
+            blocks: Blocks::new(template, self.is_serial()),
             sizes,
             order: self.sidecar.order,
-            time_dependent: formulations[number].time_dependent,
-            overwritten: AtomicU64::new(0),
-            told: AtomicU64::new(0),
-            turn: self.is_serial().then(Mutex::default),
+            time_dependent: formulation.time_dependent,
             record: self.record.clone(),
             records_once: self.records_once,
-            is_recorded,
+            is_recorded: AtomicBool::new(self.record.is_none()),
         }))
     }
 }
@@ -169,7 +155,7 @@ struct Sizes {
 /// Data common to all calls of a material.
 fn template(sizes: Sizes, cmname: &str, parameters: &[f64]) -> Block {
     let n = sizes.n_tens;
-    let mut entries = [1; N_ARGUMENTS];
+    let mut entries = [1; N_UMAT];
     for (argument, count) in [
         (A::Stress, n),
         (A::Statev, sizes.n_states),
@@ -207,14 +193,6 @@ fn template(sizes: Sizes, cmname: &str, parameters: &[f64]) -> Block {
     block.set_integers(A::Layer, &[1]);
     block.set_integers(A::Kspt, &[1]);
     block
-}
-
-/// The first result that holds a NaN.
-fn not_finite(block: &Block) -> Option<&'static str> {
-    let results = [A::Stress, A::Statev, A::Ddsdde];
-    let mut bad = results.into_iter();
-    bad.find(|result| block.reals(*result).any(|value| !value.is_finite()))
-        .map(|result| ARGUMENTS[result as usize].0)
 }
 
 /// All arguments as TOML.
@@ -257,32 +235,31 @@ fn real(value: f64) -> String {
 
 /// A UMAT with its parameters fixed.
 #[derive(Debug)]
-struct Instance {
+struct Material {
     routine: Routine,
-    blocks: Blocks<N_ARGUMENTS>,
+    blocks: Blocks<N_UMAT>,
     sizes: Sizes,
     /// How DDSDDE is in memory.
     order: Order,
     /// Its response depends on the time.
     time_dependent: bool,
-    /// Copies that the routine has overwritten, by bits, and those that have been reported.
-    overwritten: AtomicU64,
-    told: AtomicU64,
-    /// Whose turn it is, unless the routine says that it may be called by several threads.
-    turn: Option<Mutex<()>>,
     record: Option<PathBuf>,
     records_once: bool,
     is_recorded: AtomicBool,
 }
 
-impl ForeignInstance for Instance {
-    fn integrate(&self, call: Call<'_>) -> (Status, String) {
-        let _turn = self
-            .turn
-            .as_ref()
-            .map(|turn| turn.lock().unwrap_or_else(PoisonError::into_inner));
-        self.blocks
-            .with(|block| each_point(call, |start, end| self.update(block, start, end)))
+impl Instance for Material {
+    fn call(&self, request: Request, batch: Batch<'_, '_>) -> Option<Answer> {
+        let Request::Update(operator) = request else {
+            return None;
+        };
+        let n = self.sizes.n;
+        let sizes = (n, self.sizes.n_states, operator.n_entries(n));
+        Some(self.blocks.with(|block| {
+            each_point(sizes, batch, |start, end| {
+                self.update(block, operator, start, end)
+            })
+        }))
     }
 
     fn put_beside(&self, gap: Option<usize>, value: Option<f64>) -> Option<String> {
@@ -290,96 +267,60 @@ impl ForeignInstance for Instance {
     }
 
     fn take_overwritten(&self) -> Vec<String> {
-        let overwritten = self.overwritten.load(Ordering::Relaxed);
-        let told = self.told.swap(overwritten, Ordering::Relaxed);
-        let new = (0..N_ARGUMENTS).filter(|i| (overwritten & !told) >> i & 1 == 1);
-        new.map(|i| ARGUMENTS[i].0.to_owned()).collect()
+        self.blocks.take_overwritten()
     }
 }
 
-impl Instance {
+impl Material {
     fn update(
         &self,
         block: &mut Block,
-        start: &PointStart<'_>,
-        end: &mut PointEnd<'_>,
+        operator: Operator,
+        start: &Start<'_>,
+        end: &mut End<'_>,
     ) -> Result<(), Refusal> {
-        let increment: Vec<f64> = start
-            .gradient
-            .iter()
-            .zip(start.gradient_end)
-            .map(|(start, end)| end - start)
-            .collect();
-        self.call(block, start, &increment)?;
-        let n = self.sizes.n;
-        if let Some(name) = not_finite(block) {
-            // A smaller increment may mend it, unless there is none at all.
-            let at_rest = increment.iter().all(|v| *v == 0.0);
-            return Err(Refusal::error(
-                if at_rest {
-                    raw::PILUM_E_INTERNAL
-                } else {
-                    raw::PILUM_E_NUMERIC
-                },
-                format!(
-                    "the routine leaves {name} with values that are not finite{}",
-                    if at_rest { ", without any strain" } else { "" }
-                ),
-            ));
-        }
-        let rest = block.reals(A::Stress).skip(n);
-        let largest = block
-            .reals(A::Stress)
-            .fold(0.0_f64, |max, v| max.max(v.abs()));
-        if let Some(stress) = rest.into_iter().find(|v| v.abs() > OUT_OF_PLANE * largest) {
+        let ends = start.gradient.0.iter().zip(start.gradient_end.0);
+        let increment: Vec<f64> = ends.map(|(start, end)| end - start).collect();
+        self.ask(block, start, &increment)?;
+        let Sizes { n, n_tens, .. } = self.sizes;
+        let is_at_rest = increment.iter().all(|v| *v == 0.0);
+        block.finite(&[A::Stress, A::Statev, A::Ddsdde], is_at_rest)?;
+        if let Some(stress) = block.out_of_plane(A::Stress, n..n_tens) {
             return Err(Refusal::error(
                 raw::PILUM_E_UNSUPPORTED,
                 format!("a stress 13 or 23 of {stress:e} arises, which a plane problem lacks"),
             ));
         }
-        for (to, value) in end.flux.iter_mut().zip(block.reals(A::Stress)) {
-            *to = value;
+        let flux = end.flux.0.iter_mut();
+        flux.zip(block.reals(A::Stress)).for_each(|(to, v)| *to = v);
+        let state = end.state.iter_mut();
+        state
+            .zip(block.reals(A::Statev))
+            .for_each(|(to, v)| *to = v);
+        match operator {
+            Operator::None => return Ok(()),
+            Operator::Consistent => {}
+            Operator::Elastic => self.ask(block, start, &vec![0.0; n])?,
         }
-        for (to, value) in end.state.iter_mut().zip(block.reals(A::Statev)) {
-            *to = value;
-        }
-        if end.operator.is_empty() {
-            return Ok(());
-        }
-        if start.request & raw::PILUM_REQ_ELASTIC != 0 {
-            self.call(block, start, &vec![0.0; n])?;
-        }
-        let first = block.at[A::Ddsdde as usize];
-        for i in 0..n {
-            for j in 0..n {
-                let entry = match self.order {
-                    Order::Columns => i + j * self.sizes.n_tens,
-                    Order::Rows => i * self.sizes.n_tens + j,
-                };
-                end.operator[i * n + j] = f64::from_bits(block.words[first + entry]);
-            }
-        }
+        let places: Vec<usize> = (0..n).collect();
+        block.read_matrix(A::Ddsdde, self.order, &places, end.operator);
         Ok(())
     }
 
     /// One call, from fresh arguments.
-    fn call(
-        &self,
-        block: &mut Block,
-        start: &PointStart<'_>,
-        increment: &[f64],
-    ) -> Result<(), Refusal> {
+    fn ask(&self, block: &mut Block, start: &Start<'_>, increment: &[f64]) -> Result<(), Refusal> {
         block.refresh(self.blocks.template());
-        block.set(A::Stress, start.flux);
+        let site = start.site(0);
+        block.set(A::Stress, start.flux.0);
         block.set(A::Statev, start.state);
-        block.set(A::Stran, start.gradient);
+        block.set(A::Stran, start.gradient.0);
         block.set(A::Dstran, increment);
         block.set(A::Time, &[start.time - start.moment.step_start, start.time]);
         block.set(A::Dtime, &[time_of_call(start, self.time_dependent)]);
-        block.set(A::Coords, &start.site.position);
-        block.set(A::Celent, &[start.site.length]);
-        block.set_integers(A::Noel, &[start.site.element as i32]);
-        block.set_integers(A::Npt, &[start.site.point as i32]);
+        block.set(A::Coords, &site.position);
+        block.set(A::Celent, &[site.length]);
+        block.set_integers(A::Noel, &[site.element as i32]);
+        block.set_integers(A::Npt, &[site.point as i32]);
         // A static procedure of small strains.
         block.set_integers(A::Jstep, &[start.moment.step as i32, 1, 0, 0]);
         block.set_integers(A::Kinc, &[start.moment.increment as i32]);
@@ -396,14 +337,11 @@ impl Instance {
         }
         self.routine.call(&mut block.words, &block.at, N_CMNAME);
         // Known before anything else fails: a damaged block is not used again.
-        let overwritten = block.overwritten();
+        let returned = self.blocks.returned(block);
         if let (Some(path), Some(given)) = (recorded, &given) {
             record(path, given, Some(block))?;
         }
-        let overwritten = overwritten?;
-        if overwritten != 0 {
-            self.overwritten.fetch_or(overwritten, Ordering::Relaxed);
-        }
+        returned?;
         let factor = block.reals(A::Pnewdt).next().unwrap_or(1.0);
         if factor >= 1.0 {
             return Ok(());

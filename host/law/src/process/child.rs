@@ -324,7 +324,7 @@ mod tests {
 
     /// Runs one of the tests below that is left out unless it is asked for by name.
     fn run_test(name: &str, seconds: u64, memory: Option<u64>) -> Outcome {
-        let name = format!("child::tests::{name}");
+        let name = format!("process::child::tests::{name}");
         run(&Work {
             arguments: [&name, "--exact", "--ignored", "--nocapture"]
                 .map(OsString::from)

@@ -7,8 +7,9 @@
 //! | [`Adapter::Mfront`] | behaviours of MFront's generic interface | yes, by its symbols |
 //! | [`Adapter::Udsm`] | a user-defined soil model of PLAXIS | yes, by functions, which run in a worker |
 //!
-//! A further adapter is a variant of [`Adapter`], an arm of `open`, a `ForeignLaw` and a
-//! `ForeignInstance`.
+//! Shared by all of them: `each_point`, which carries a batch through a routine for one point, and for routines that take
+//! bare addresses the `guarded` arguments. A further adapter is a variant of [`Adapter`], an arm of `open`, and a `Source`
+//! with its `Instance`.
 
 pub mod conventions;
 mod guarded;
@@ -20,16 +21,14 @@ mod umat;
 
 pub use umat::SYMBOLS as UMAT_SYMBOLS;
 
-use super::description::LawDescription;
-use super::library::{Call, CallFailure, Strided};
-use super::library_bytes::Image;
-use super::{Moment, Site};
 use crate::Error;
-use abi::Hypothesis;
+use crate::call::{Batch, End, Start, Strided};
+use crate::description::{LawDescription, is_false};
+use crate::instance::{Answer, Source as LawSource};
+use crate::process::library_bytes::Image;
 use abi::raw::{self, Status};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use text::Source;
@@ -68,16 +67,6 @@ pub enum Externals {
     Trap,
 }
 
-impl Externals {
-    /// Its name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Refuse => "refuse",
-            Self::Trap => "trap",
-        }
-    }
-}
-
 /// How the stiffness that a routine leaves is in memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -87,16 +76,6 @@ pub enum Order {
     Columns,
     /// By rows, as in C.
     Rows,
-}
-
-impl Order {
-    /// Its name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Columns => "columns",
-            Self::Rows => "rows",
-        }
-    }
 }
 
 /// What becomes of the files that a UMAT leaves in its working folder.
@@ -120,10 +99,12 @@ pub struct Foreign {
     /// Its description, if not in the usual place.
     pub sidecar: Option<PathBuf>,
     /// Call it in this process and not in workers.
+    #[serde(default)]
     pub in_process: bool,
     /// Write the arguments of one call here.
     pub record: Option<PathBuf>,
     /// Not if they are there already.
+    #[serde(default, skip_serializing_if = "is_false")]
     pub records_once: bool,
     /// What becomes of routines that it calls and nobody supplies; else the sidecar says it.
     pub externals: Option<Externals>,
@@ -148,68 +129,63 @@ impl Foreign {
             tangent_order: None,
         }
     }
-}
 
-/// A law of a foreign library, without parameters yet.
-pub(crate) trait ForeignLaw: Debug + Send + Sync {
-    /// Whether calls of one material must follow one another.
-    fn is_serial(&self) -> bool;
-
-    /// Fixes the parameters (in declared order; NaN: left out). What the library keeps between
-    /// calls belongs to this one material.
-    ///
-    /// # Errors
-    /// Status and reason.
-    fn create(
-        &self,
-        hypothesis: Hypothesis,
-        parameters: &[f64],
-    ) -> Result<Box<dyn ForeignInstance>, CallFailure>;
-}
-
-/// A law of a foreign library with its parameters fixed.
-pub(crate) trait ForeignInstance: Debug + Send + Sync {
-    /// Initial internal variables; `None` if the description says all there is to say.
-    fn init_state(&self, _call: Call<'_>) -> Option<(Status, String)> {
-        None
-    }
-
-    /// Carries the points over the increment. Returns the most severe status and a message.
-    fn integrate(&self, call: Call<'_>) -> (Status, String);
-
-    /// Arguments that the routine has overwritten though it is given them to read, those that were
-    /// not told before.
-    fn take_overwritten(&self) -> Vec<String> {
-        Vec::new()
-    }
-
-    /// Puts a number between the arguments of calls from now on, in front of that one or everywhere; the usual one if
-    /// none exists. In words where that is; `None` if there is no such place.
-    fn put_beside(&self, _gap: Option<usize>, _value: Option<f64>) -> Option<String> {
-        None
+    /// The same library at this path as a capsule has it: called in this process, once. A file holds paths as texts.
+    pub(crate) fn of_capsule(&self, library: &Path) -> Self {
+        let text = |path: &Path| PathBuf::from(path.to_string_lossy().into_owned());
+        Self {
+            library: text(library),
+            sidecar: self.sidecar.as_deref().map(text),
+            in_process: true,
+            record: None,
+            records_once: false,
+            scratch: None,
+            ..self.clone()
+        }
     }
 }
 
 /// What a foreign library offers.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct ForeignLaws {
     /// Laws with what builds them.
-    pub(crate) laws: Vec<(LawDescription, Arc<dyn ForeignLaw>)>,
+    pub(crate) laws: Vec<(LawDescription, Arc<dyn LawSource>)>,
     /// SHA-256 of the file that describes them, where the library does not.
     pub(crate) sidecar: Option<String>,
     /// What that file says of routines that nobody supplies, and of scratch files.
     pub(crate) wishes: (Option<Externals>, Option<Scratch>),
 }
 
+/// Why a foreign library cannot be opened.
+#[derive(Debug)]
+pub(crate) enum Fault {
+    /// A defect of the library, in words that stand behind its name.
+    Library(String),
+    /// A defect that has its own place, such as a line of a sidecar.
+    Other(Error),
+}
+
+impl From<String> for Fault {
+    fn from(why: String) -> Self {
+        Self::Library(why)
+    }
+}
+
+impl From<Error> for Fault {
+    fn from(error: Error) -> Self {
+        Self::Other(error)
+    }
+}
+
 /// Describes the laws of a foreign library. Nothing of it runs, but for a UDSM's functions.
 ///
 /// # Errors
-/// [`Error::Library`] for the library; [`text::Error::Input`] at the place of its description.
-pub(crate) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Error> {
+/// The defect of the library, or of its description at its place.
+pub(crate) fn open(foreign: &Foreign, image: &Image) -> Result<ForeignLaws, Fault> {
     match foreign.adapter {
-        Adapter::Umat => umat::open(foreign, image),
-        Adapter::Mfront => mfront::open(foreign, image),
-        Adapter::Udsm => udsm::open(foreign, image),
+        Adapter::Umat => Ok(umat::open(foreign, image)?),
+        Adapter::Mfront => Ok(mfront::open(foreign, image)?),
+        Adapter::Udsm => Ok(udsm::open(foreign, image)?),
     }
 }
 
@@ -232,40 +208,6 @@ pub fn sidecar(source: &Source) -> Result<LawDescription, Error> {
 /// It has no readable description.
 pub fn behaviours(bytes: &[u8]) -> Result<Vec<LawDescription>, String> {
     mfront::describe(bytes)
-}
-
-/// A point at the start of an increment, and the gradient at its end.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct PointStart<'a> {
-    /// Gradient at the start.
-    pub(crate) gradient: &'a [f64],
-    /// Gradient at the end.
-    pub(crate) gradient_end: &'a [f64],
-    /// Flux at the start.
-    pub(crate) flux: &'a [f64],
-    /// Internal variables at the start.
-    pub(crate) state: &'a [f64],
-    /// Time at the start.
-    pub(crate) time: f64,
-    /// Time increment.
-    pub(crate) time_increment: f64,
-    /// The request: `PILUM_REQ_…`.
-    pub(crate) request: u32,
-    /// Numbers of step and increment.
-    pub(crate) moment: Moment,
-    /// Where the point lies.
-    pub(crate) site: Site,
-}
-
-/// Where the results of a point go; all zero before.
-#[derive(Debug)]
-pub(crate) struct PointEnd<'a> {
-    /// Flux.
-    pub(crate) flux: &'a mut [f64],
-    /// Internal variables.
-    pub(crate) state: &'a mut [f64],
-    /// The operator that is asked for, row-major; empty if none is.
-    pub(crate) operator: &'a mut [f64],
 }
 
 /// Why a point has no results.
@@ -296,7 +238,7 @@ const TIME_AT_REST: f64 = 1.0;
 const MOMENT_AT_REST: f64 = 1e-9;
 
 /// The time increment that a routine is given, which may divide by it: never 0.
-pub(crate) fn time_of_call(start: &PointStart<'_>, time_dependent: bool) -> f64 {
+pub(crate) fn time_of_call(start: &Start<'_>, time_dependent: bool) -> f64 {
     if start.time_increment > 0.0 {
         start.time_increment
     } else if time_dependent {
@@ -306,46 +248,47 @@ pub(crate) fn time_of_call(start: &PointStart<'_>, time_dependent: bool) -> f64 
     }
 }
 
-/// Carries the points of a batch over the increment, each by itself. A point that fails does not
-/// stop the others; the message is that of the first of the worst.
+/// Carries the points of a batch over the increment, each by itself: `update` has a start and an end of one point, whose
+/// values stand one after the other, and those of the end are zero before. A point that fails does not stop the others;
+/// the message is that of the first of the worst.
 pub(crate) fn each_point(
-    call: Call<'_>,
-    mut update: impl FnMut(&PointStart<'_>, &mut PointEnd<'_>) -> Result<(), Refusal>,
-) -> (Status, String) {
-    let (n, n_states) = (call.n_components, call.n_states);
-    let wants_operator = call.request & (raw::PILUM_REQ_TANGENT | raw::PILUM_REQ_ELASTIC) != 0;
-    let n_operator = if wants_operator { n * n } else { 0 };
-    let (mut gradient, mut gradient_end) = (vec![0.0; n], vec![0.0; n]);
-    let (mut flux, mut flux_end) = (vec![0.0; n], vec![0.0; n]);
-    let mut flux1 = call.flux1;
+    (n, n_states, n_operator): (usize, usize, usize),
+    (start, end, outcomes): Batch<'_, '_>,
+    mut update: impl FnMut(&Start<'_>, &mut End<'_>) -> Result<(), Refusal>,
+) -> Answer {
+    let rows = Strided::rows(n);
+    let [mut gradient, mut gradient_end, mut flux, mut flux_end] = [(); 4].map(|()| vec![0.0; n]);
     let mut worst = (raw::PILUM_OK, String::new());
-    for point in 0..call.n_points {
-        gather(call.gradient0, point, &mut gradient);
-        gather(call.gradient1, point, &mut gradient_end);
-        gather(Some(call.flux0), point, &mut flux);
+    for point in 0..start.n_points {
+        gather(start.gradient, point, &mut gradient);
+        gather(start.gradient_end, point, &mut gradient_end);
+        gather(start.flux, point, &mut flux);
         flux_end.fill(0.0);
-        let start = PointStart {
-            gradient: &gradient,
-            gradient_end: &gradient_end,
-            flux: &flux,
-            state: &call.state0[point * n_states..][..n_states],
-            time: call.time,
-            time_increment: call.time_increment,
-            request: call.request,
-            moment: call.moment,
-            site: call.sites.get(point).copied().unwrap_or_default(),
+        let sites = [start.site(point)];
+        let one = Start {
+            n_points: 1,
+            gradient: (&gradient, rows),
+            gradient_end: (&gradient_end, rows),
+            flux: (&flux, rows),
+            state: if start.state.is_empty() {
+                &[]
+            } else {
+                &start.state[point * n_states..][..n_states]
+            },
+            sites: &sites,
+            ..*start
         };
-        let mut end = PointEnd {
-            flux: &mut flux_end,
-            state: &mut call.state1[point * n_states..][..n_states],
-            operator: &mut call.tangent[point * n_operator..][..n_operator],
+        let mut its_end = End {
+            flux: (&mut flux_end, rows),
+            state: &mut end.state[point * n_states..][..n_states],
+            operator: &mut end.operator[point * n_operator..][..n_operator],
         };
-        end.state.fill(0.0);
-        end.operator.fill(0.0);
-        let status = match update(&start, &mut end) {
+        its_end.state.fill(0.0);
+        its_end.operator.fill(0.0);
+        let status = match update(&one, &mut its_end) {
             Ok(()) => raw::PILUM_OK,
             Err(refusal) => {
-                call.step_factor[point] = refusal.factor;
+                outcomes.factor[point] = refusal.factor;
                 let status = abi::status::most_severe(worst.0, refusal.status);
                 if status != worst.0 {
                     worst = (status, format!("point {point}: {}", refusal.message));
@@ -353,22 +296,22 @@ pub(crate) fn each_point(
                 refusal.status
             }
         };
-        call.status[point] = status;
-        if let Some((values, place)) = &mut flux1 {
-            let first = place.offset + point * place.point;
+        outcomes.status[point] = status;
+        let (values, place) = &mut end.flux;
+        if !values.is_empty() {
             for (c, value) in flux_end.iter().enumerate() {
-                values[first + c * place.component] = *value;
+                values[place.at(point, c)] = *value;
             }
         }
     }
     worst
 }
 
-fn gather(values: Option<(&[f64], Strided)>, point: usize, out: &mut [f64]) {
-    if let Some((values, place)) = values {
-        let first = place.offset + point * place.point;
+/// The values of a point; nothing where there are none.
+fn gather((values, place): (&[f64], Strided), point: usize, out: &mut [f64]) {
+    if !values.is_empty() {
         for (c, value) in out.iter_mut().enumerate() {
-            *value = values[first + c * place.component];
+            *value = values[place.at(point, c)];
         }
     }
 }

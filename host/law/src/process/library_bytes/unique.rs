@@ -3,7 +3,7 @@
 //! In the copy of a library that is loaded they become ordinary symbols, so that every image has its own. Those of
 //! the compiler's library, and of libraries that this one is linked with, stay as they are: they are meant to be shared.
 
-use crate::inspect;
+use crate::needs::{each_supplier, needs};
 use object::read::elf::{FileHeader, SectionHeader, Sym};
 use object::{Endianness, ReadCache, ReadRef, elf};
 use std::collections::BTreeSet;
@@ -94,9 +94,13 @@ fn of_linked(path: &Path) -> BTreeSet<String> {
     let Ok(bytes) = text::file::read_library(path) else {
         return names;
     };
-    inspect::each_supplier(path, &bytes, |bytes| {
-        names.extend(unique(bytes).into_iter().flatten().map(|(_, _, name)| name));
-    });
+    let file = object::File::parse(&*bytes).ok();
+    let wanted = file.and_then(|file| needs(&file, &bytes).ok());
+    if let Some((needs, search)) = wanted {
+        each_supplier(path, (&needs, &search), |_, bytes| {
+            names.extend(unique(bytes).into_iter().flatten().map(|(_, _, name)| name));
+        });
+    }
     names
 }
 

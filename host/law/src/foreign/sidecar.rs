@@ -3,9 +3,10 @@
 use super::{Externals, Order, Scratch};
 use crate::Error;
 use crate::description::{
-    Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription, Tangent,
+    Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription,
+    Tangent, hypothesis_named, is_identifier,
 };
-use crate::hexadecimal_sha256;
+use crate::process::library_bytes::hexadecimal_sha256;
 use abi::Hypothesis;
 use serde::Deserialize;
 use std::collections::HashSet;
@@ -162,15 +163,13 @@ impl Sidecar {
                 hypothesis: hypothesis.name(),
                 index: formulations.len() as u32,
                 symmetric: file.symmetric,
-                linear: false,
                 tangent: match file.tangent {
                     Given::Consistent => Tangent::Consistent,
                     Given::Approximate => Tangent::Approximate,
                 },
-                rates: false,
                 time_dependent: file.time_dependent,
-                local_axes: false,
                 internal_variables: variables.clone(),
+                ..FormulationDescription::default()
             });
         }
         unique(source, hypotheses.iter(), "hypothesis")?;
@@ -181,12 +180,16 @@ impl Sidecar {
             let message = format!("`cmname`: expected at most {CMNAME} ASCII characters");
             return Err(source.error(at, message).into());
         }
-        let or = |text: String, other: &str| {
-            if text.is_empty() {
-                other.to_owned()
-            } else {
-                text
-            }
+        let law = LawDescription {
+            name: file.name,
+            version: file.version,
+            author: file.author,
+            licence: file.licence,
+            doc: file.doc,
+            references: file.references,
+            parameters,
+            formulations,
+            id: id.clone(),
         };
         Ok(Self {
             cmname: cmname.to_ascii_uppercase(),
@@ -196,17 +199,7 @@ impl Sidecar {
             order: file.tangent_order,
             wishes: (file.externals, file.scratch),
             sha256: hexadecimal_sha256(source.text().as_bytes()),
-            law: LawDescription {
-                name: or(file.name, &id),
-                version: or(file.version, "unversioned"),
-                author: or(file.author, "unknown"),
-                licence: or(file.licence, "unknown licence"),
-                doc: file.doc,
-                references: or(file.references, "none given"),
-                parameters,
-                formulations,
-                id,
-            },
+            law: law.completed(),
         })
     }
 }
@@ -230,11 +223,7 @@ pub(super) fn find(library: &Path) -> Result<PathBuf, Error> {
 
 fn identifier(source: &Source, id: &Spanned<String>, what: &str) -> Result<String, Error> {
     let text = id.get_ref();
-    let well_formed = text.starts_with(|c: char| c.is_ascii_lowercase())
-        && text
-            .chars()
-            .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_');
-    if well_formed {
+    if is_identifier(text) {
         return Ok(text.clone());
     }
     Err(source
@@ -306,8 +295,7 @@ fn columns(source: &Source, internal: &[Internal]) -> Result<(), Error> {
 }
 
 fn hypothesis(source: &Source, name: &Spanned<String>) -> Result<Hypothesis, Error> {
-    let mut all = Hypothesis::ALL.into_iter();
-    all.find(|h| h.name() == name.get_ref()).ok_or_else(|| {
+    hypothesis_named(name.get_ref()).ok_or_else(|| {
         let message = format!("there is no hypothesis `{}`", name.get_ref());
         source
             .error(name.span(), message)
@@ -380,15 +368,9 @@ fn parameter(source: &Source, p: &Parameter) -> Result<ParameterDescription, Err
         unit: p.unit.clone(),
         doc: p.doc.clone(),
         default: p.default.as_ref().map(|v| *v.get_ref()),
-        optional: false,
         bounds,
-        usual: Bounds {
-            lower: usual[0],
-            open_lower: false,
-            upper: usual[1],
-            open_upper: false,
-        },
-        choices: Vec::new(),
+        usual: Bounds::closed(usual[0], usual[1]),
+        ..ParameterDescription::default()
     })
 }
 
