@@ -1,6 +1,8 @@
 //! What an earlier run left in a results folder, and what must not be mistaken for results of the
 //! next one.
 
+use crate::log_file::LogFile;
+use crate::summary::{self, Summary};
 use std::ffi::OsStr;
 use std::path::Path;
 use text::Error;
@@ -17,7 +19,7 @@ const NAMES: [&str; 11] = [
     "fields.pvd",
     "report.html",
     "report.html.part",
-    "summary.json",
+    summary::FILE_NAME,
     "summary.json.part",
 ];
 
@@ -34,8 +36,35 @@ pub(crate) fn remove(folder: &Path) -> Result<(), Error> {
     remove_if(folder, ours)
 }
 
+/// Removes what an earlier run left in a folder, for work that comes before the next one begins there: if
+/// that fails, nothing is there as its result.
+///
+/// # Errors
+/// [`Error::Unwritable`]; another run writes there.
+pub fn make_way(folder: &Path) -> Result<(), Error> {
+    std::fs::create_dir_all(folder).map_err(|error| Error::unwritable(folder, error))?;
+    let _log = LogFile::begin(folder)?;
+    remove(folder)?;
+    remove_if(folder, |name| name == "history.csv")
+}
+
+/// Removes from the common folder of a case's variants what an earlier run of them wrote there:
+/// figures over all of them, and their comparison.
+///
+/// # Errors
+/// [`Error::Unwritable`].
+pub fn remove_comparison(folder: &Path, figures: &[&str]) -> Result<(), Error> {
+    if !folder.is_dir() {
+        return Ok(());
+    }
+    remove_if(folder, |name| {
+        let figure = name.strip_suffix(".svg");
+        name == "report.html" || figure.is_some_and(|stem| figures.contains(&stem))
+    })
+}
+
 /// Removes files of these names where there are any.
-pub(crate) fn remove_if(folder: &Path, ours: impl Fn(&str) -> bool) -> Result<(), Error> {
+fn remove_if(folder: &Path, ours: impl Fn(&str) -> bool) -> Result<(), Error> {
     let unreadable = |error| Error::unwritable(folder, error);
     for entry in std::fs::read_dir(folder).map_err(unreadable)? {
         let entry = entry.map_err(unreadable)?;
@@ -58,14 +87,11 @@ fn is_field(name: &str) -> bool {
 
 /// Pictures of the earlier run, from its summary; none if that cannot be read.
 fn pictures(folder: &Path) -> Vec<String> {
-    let summary = std::fs::read(folder.join("summary.json")).unwrap_or_default();
-    let summary: serde_json::Value = serde_json::from_slice(&summary).unwrap_or_default();
-    let names = summary["pictures"].as_array().into_iter().flatten();
+    let summary = std::fs::read(folder.join(summary::FILE_NAME)).unwrap_or_default();
+    let summary: Summary = serde_json::from_slice(&summary).unwrap_or_default();
+    let mut names = summary.head.pictures;
+    names.retain(|name| Path::new(name).extension() == Some(OsStr::new("svg")));
     names
-        .filter_map(|name| name.as_str())
-        .filter(|name| Path::new(name).extension() == Some(OsStr::new("svg")))
-        .map(str::to_owned)
-        .collect()
 }
 
 #[cfg(test)]

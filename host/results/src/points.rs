@@ -3,7 +3,8 @@
 use crate::file::Extent;
 use crate::output_request::When;
 use crate::pressures::Pressure;
-use crate::recorder::{Cell, Table, internal_variables};
+use crate::recorder::internal_variables;
+use crate::table::{Cell, Table};
 use mechanics::simulation::Snapshot;
 use mechanics::{Place, Simulation};
 use std::path::Path;

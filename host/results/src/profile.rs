@@ -3,9 +3,9 @@
 use crate::file::Extent;
 use crate::output_request::When;
 use crate::pressures::Pressure;
-use crate::recorder::{Cell, Table, internal_variables};
+use crate::recorder::internal_variables;
 use crate::report::{Point, Profiles};
-use crate::table::{push, push_count, push_text};
+use crate::table::{Cell, Table, push, push_count, push_text};
 use mechanics::group::Group;
 use mechanics::simulation::Snapshot;
 use mechanics::{Place, Simulation};

@@ -5,8 +5,9 @@
 
 use crate::fields::{self, Fields, Written};
 use crate::figure::{Curve, Figures};
-use crate::file::{self, Appended, Extent};
+use crate::file::{self, Extent};
 use crate::leftovers;
+use crate::log_file::LogFile;
 use crate::mesh_error::OfPhase;
 use crate::output_request::{Output, OutputRequest, When};
 use crate::pile::{Curve as PileCurve, Pile, Resistances, State as PileState, Stations};
@@ -14,18 +15,16 @@ use crate::points::Points;
 use crate::probe::{Probes, Sizes};
 use crate::profile::Profile;
 use crate::report::Known;
-use crate::summary::{About, Course, Ending, Stopped, Summary};
-use crate::table::{push, push_count, push_text};
+use crate::summary::{self, About, Course, Ending, Progress, RUNNING, Running, Stopped};
+use crate::table::{Cell, Table};
 use mechanics::equilibrium::Iteration;
 use mechanics::group::Group;
 use mechanics::simulation::{self, Increment, PhaseRecord, Snapshot};
 use mechanics::{NoEquilibrium, Place, Problem, Simulation};
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use text::Error;
-use text::write::replace;
 
 /// The results of a run, as they are written.
 #[derive(Debug)]
@@ -42,7 +41,7 @@ pub struct Recorder {
     points: Option<Points>,
     fields: Option<Fields>,
     log: LogFile,
-    summary: Summary,
+    summary: Progress,
     figures: Figures,
     seconds: Duration,
 }
@@ -109,84 +108,6 @@ fn empty_figures(wanted: &OutputRequest) -> Figures {
     Figures::new(&wanted.title, &wanted.figures, names)
 }
 
-/// Content of a table cell.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Cell<'a> {
-    Text(&'a str),
-    Count(usize),
-    /// Empty where absent.
-    Number(Option<f64>),
-    /// Some cells as a row has them.
-    Written(&'a [u8]),
-}
-
-impl Cell<'_> {
-    /// Appends it to a row.
-    pub(crate) fn push(self, row: &mut Vec<u8>) {
-        match self {
-            Cell::Text(text) => push_text(row, text),
-            Cell::Count(count) => push_count(row, count),
-            Cell::Number(None) => (),
-            Cell::Number(Some(value)) => push(row, value),
-            Cell::Written(cells) => row.extend_from_slice(cells),
-        }
-    }
-}
-
-/// A CSV file.
-#[derive(Debug)]
-pub(crate) struct Table {
-    file: Appended,
-    /// Rows that are not in the file yet.
-    rows: Vec<u8>,
-}
-
-impl Table {
-    /// Begins a file with a head; or, `from` what it held, goes on after that of an earlier run's.
-    pub(crate) fn begin<'a>(
-        path: PathBuf,
-        columns: impl IntoIterator<Item = &'a str>,
-        from: Option<Extent>,
-    ) -> Result<Self, Error> {
-        let mut table = Self {
-            file: Appended::begin(path, from)?,
-            rows: Vec::new(),
-        };
-        if from.is_none() {
-            table.row(columns.into_iter().map(Cell::Text));
-            table.flush()?;
-        }
-        Ok(table)
-    }
-
-    /// Adds a row, of two cells at least.
-    pub(crate) fn row<'a>(&mut self, cells: impl IntoIterator<Item = Cell<'a>>) {
-        for cell in cells {
-            cell.push(&mut self.rows);
-            self.rows.push(b',');
-        }
-        self.rows.pop();
-        self.rows.push(b'\n');
-    }
-
-    /// Writes the rows that are waiting, all of them or none.
-    pub(crate) fn flush(&mut self) -> Result<(), Error> {
-        let written = self.file.append(&self.rows);
-        self.rows.clear();
-        written
-    }
-
-    /// Bytes in the file.
-    pub(crate) fn length(&self) -> u64 {
-        self.file.length()
-    }
-
-    /// Waits until everything is on the disk.
-    pub(crate) fn sync(&self) -> Result<Extent, Error> {
-        self.file.sync()
-    }
-}
-
 /// Ids of the internal variables of all laws that these groups ever carry, each once.
 pub(crate) fn internal_variables(
     simulation: &Simulation,
@@ -224,41 +145,6 @@ fn history_row<'a>(
     .chain([Cell::Count(iterations)])
 }
 
-/// One JSON object a line. As long as it is open, no other run writes into the folder.
-#[derive(Debug)]
-struct LogFile(Appended);
-
-impl LogFile {
-    fn line(&mut self, value: &Value) -> Result<(), Error> {
-        self.lines([value])
-    }
-
-    /// All of them at once.
-    fn lines(&mut self, values: impl IntoIterator<Item = impl Serialize>) -> Result<(), Error> {
-        let mut text = Vec::new();
-        for value in values {
-            serde_json::to_writer(&mut text, &value)
-                .map_err(|error| Error::Internal(error.to_string()))?;
-            text.push(b'\n');
-        }
-        self.0.append(&text)
-    }
-}
-
-/// An iteration as the log has it, in the order of the other lines' keys.
-#[derive(Serialize)]
-struct LoggedIteration<'a> {
-    correction: Option<f64>,
-    event: &'static str,
-    increment: usize,
-    iteration: usize,
-    load_factor: f64,
-    phase: &'a str,
-    residual: f64,
-    step_length: f64,
-    viscosity: f64,
-}
-
 impl Recorder {
     /// Creates the folder and its files, and removes those of an earlier run.
     ///
@@ -271,7 +157,7 @@ impl Recorder {
         simulation: &Simulation,
     ) -> Result<Self, Error> {
         std::fs::create_dir_all(folder).map_err(|error| Error::unwritable(folder, error))?;
-        let log = LogFile(Appended::begin_locked(folder.join("log.jsonl"), false)?);
+        let log = LogFile::begin(folder)?;
         leftovers::remove(folder)?;
         Self::begin(folder, wanted, about, simulation, log, None)
     }
@@ -288,10 +174,10 @@ impl Recorder {
         simulation: &Simulation,
         state: ResultsState,
     ) -> Result<Self, Error> {
-        let log = Appended::begin_locked(folder.join("log.jsonl"), true)?;
+        let log = LogFile::begin_again(folder)?;
         // Nothing is cut to its length before all are known to be good.
         state.check(folder)?;
-        let log = LogFile(log.go_on(state.log)?);
+        let log = log.go_on(state.log)?;
         Self::begin(folder, wanted, about, simulation, log, Some(state))
     }
 
@@ -341,7 +227,7 @@ impl Recorder {
             .iter()
             .filter(|phase| phase.reset_displacements);
         let resets: Vec<String> = resets.map(|phase| phase.name.clone()).collect();
-        let summary = Summary::new(about, &wanted, simulation);
+        let summary = Progress::new(about, &wanted, simulation);
         let figures = empty_figures(&wanted);
         let of_pile = |(pile, stations): (Pile, Stations)| OfPile {
             too_early: pile.phases_too_early(simulation.problem()),
@@ -377,7 +263,11 @@ impl Recorder {
                 fields.written = written;
             }
         }
-        write_summary(folder, &results.summary.running())?;
+        let running = Running {
+            head: results.summary.head(),
+            status: RUNNING,
+        };
+        summary::write(folder, running)?;
         Ok(results)
     }
 
@@ -399,7 +289,7 @@ impl Recorder {
             profile: profile.transpose()?,
             pile: pile.transpose()?,
             points: points.transpose()?,
-            log: self.log.0.sync()?,
+            log: self.log.sync()?,
             fields: self.fields.as_ref().map(|fields| fields.written.clone()),
             course: self.summary.course.clone(),
             curves: self.figures.curves(),
@@ -417,19 +307,7 @@ impl Recorder {
         lambda: f64,
         iterations: &[Iteration],
     ) -> Result<(), Error> {
-        let lines = iterations.iter().enumerate();
-        self.log
-            .lines(lines.map(|(number, iteration)| LoggedIteration {
-                correction: iteration.correction,
-                event: "iteration",
-                increment: place.increment,
-                iteration: number,
-                load_factor: lambda,
-                phase: &place.phase,
-                residual: iteration.residual,
-                step_length: iteration.step_length,
-                viscosity: iteration.viscosity,
-            }))
+        self.log.iterations(place, lambda, iterations)
     }
 
     /// Logs a cut-back.
@@ -443,14 +321,7 @@ impl Recorder {
         step: f64,
         reason: &str,
     ) -> Result<(), Error> {
-        self.log.line(&json!({
-            "event": "cut_back",
-            "phase": place.phase,
-            "increment": place.increment,
-            "load_factor": lambda,
-            "next_step": step,
-            "reason": reason,
-        }))
+        self.log.cut_back(place, lambda, step, reason)
     }
 
     /// What the results look at in a state; `None`: all of it.
@@ -620,12 +491,7 @@ impl Recorder {
             self.summary.course.mesh_errors.push(found);
         }
         if let Some(warning) = &increment.unreliable {
-            self.log.line(&json!({
-                "event": "unreliable",
-                "phase": place.phase,
-                "increment": place.increment,
-                "reason": warning,
-            }))?;
+            self.log.unreliable(place, warning)?;
         }
         self.figures.increment(place, &probes);
         self.figures.cuts(place, *of, snapshot);
@@ -703,14 +569,10 @@ impl Recorder {
         let mut summary = self
             .summary
             .finish(groups, [total, self.seconds], warnings, ending);
-        if let Some(resistances) = self.resistances() {
-            summary["pile"] = resistances.summary();
-        }
-        let logged = self
-            .log
-            .line(&json!({ "event": "end", "status": summary["status"] }));
+        summary.pile = self.resistances().map(|found| found.summary());
+        let logged = self.log.end(&ending.status);
         // A log that takes no more must not leave a run that seems to go on.
-        write_summary(&self.folder, &summary)?;
+        summary::write(&self.folder, summary)?;
         logged.and(drawn)
     }
 }
@@ -733,64 +595,4 @@ impl From<Error> for Fault {
     fn from(error: Error) -> Self {
         Self::File(error)
     }
-}
-
-/// Removes what an earlier run left in a folder, for work that comes before the next one begins there: if
-/// that fails, nothing is there as its result.
-///
-/// # Errors
-/// [`Error::Unwritable`]; another run writes there.
-pub fn make_way(folder: &Path) -> Result<(), Error> {
-    std::fs::create_dir_all(folder).map_err(|error| Error::unwritable(folder, error))?;
-    let _log = Appended::begin_locked(folder.join("log.jsonl"), false)?;
-    leftovers::remove(folder)?;
-    leftovers::remove_if(folder, |name| name == "history.csv")
-}
-
-/// Removes from the common folder of a case's variants what an earlier run of them wrote there:
-/// figures over all of them, and their comparison.
-///
-/// # Errors
-/// [`Error::Unwritable`].
-pub fn remove_comparison(folder: &Path, figures: &[&str]) -> Result<(), Error> {
-    if !folder.is_dir() {
-        return Ok(());
-    }
-    leftovers::remove_if(folder, |name| {
-        let figure = name.strip_suffix(".svg");
-        name == "report.html" || figure.is_some_and(|stem| figures.contains(&stem))
-    })
-}
-
-/// Has the summary of a run that could not end it say how it ended. Whether there is one.
-///
-/// # Errors
-/// [`Error::Unreadable`] or [`Error::Unwritable`].
-pub fn end_summary(folder: &Path, ending: &Ending) -> Result<bool, Error> {
-    let path = folder.join("summary.json");
-    if !path.is_file() {
-        return Ok(false);
-    }
-    let text = std::fs::read_to_string(&path).map_err(|source| Error::Unreadable {
-        path: path.clone(),
-        source,
-    })?;
-    let Ok(Value::Object(mut summary)) = serde_json::from_str(&text) else {
-        return Ok(false);
-    };
-    summary.insert("status".to_owned(), ending.status.into());
-    summary.insert("error".to_owned(), json!(ending.error));
-    summary.insert("mechanism".to_owned(), json!(ending.mechanism));
-    write_summary(folder, &summary.into())?;
-    Ok(true)
-}
-
-/// Writes the summary whole or not at all.
-fn write_summary(folder: &Path, summary: &Value) -> Result<(), Error> {
-    let path = folder.join("summary.json");
-    let partial = folder.join("summary.json.part");
-    let text = serde_json::to_string_pretty(summary)
-        .map_err(|error| Error::Internal(error.to_string()))?;
-    replace(&partial, text + "\n")?;
-    std::fs::rename(&partial, &path).map_err(|error| Error::unwritable(&path, error))
 }

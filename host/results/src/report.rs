@@ -26,8 +26,8 @@ use text::Error;
 use text::write::replace_whole;
 
 use crate::output_request::OutputRequest;
+use crate::summary;
 use crate::summary::About;
-use crate::summary_reader;
 use budget::Budget;
 use mechanics::Simulation;
 use results::Run;
@@ -107,7 +107,11 @@ impl Running {
 
 /// Whether a folder holds what a run has written, which a dry run leaves unchanged.
 fn has_results(folder: &Path) -> bool {
-    let written = ["summary.json", "history.csv", crate::checkpoint::FILE_NAME];
+    let written = [
+        summary::FILE_NAME,
+        "history.csv",
+        crate::checkpoint::FILE_NAME,
+    ];
     written.iter().any(|name| folder.join(name).is_file())
 }
 
@@ -156,7 +160,7 @@ fn study_among(folders: &[PathBuf]) -> Result<Option<&Path>, Error> {
 fn read(folders: &[PathBuf], known: Option<Known>) -> Result<Vec<Run>, Error> {
     let budget = Budget::of(folders.len());
     let mut known = known.filter(|_| folders.len() == 1).unwrap_or_default();
-    let named = summary_reader::names(folders).into_iter().zip(folders);
+    let named = summary::names(folders).into_iter().zip(folders);
     named
         .map(|(name, folder)| Run::read(&name, folder, std::mem::take(&mut known), &budget))
         .collect()

@@ -2,25 +2,26 @@
 //! values of their probes. For a study: its parameters, its outputs, and every run.
 
 use crate::study::{self, History, State};
-use crate::summary_reader::{entries, names, settings, settings_of_files, text};
+use crate::summary::{
+    FILE_NAME, RUNNING, Resistances, Summary, names, settings, settings_of_files,
+};
+use crate::table::comma_separated;
 use indexmap::{IndexMap, IndexSet};
 use serde_json::{Value, json};
-use std::io;
 use std::path::{Path, PathBuf};
-use text::{Error, Source};
+use std::{io, iter};
+use text::Error;
 
-/// The file that makes a folder one of results.
-const SUMMARY: &str = "summary.json";
-/// Values that the record of a pile may have, `pile.` before it in the table.
-const RESISTANCES: [&str; 3] = [
-    "resistance_10_percent_diameter",
-    "resistance_davisson",
-    "resistance_chin",
+/// Columns of the resistances of piles.
+const OF_PILE: [&str; 3] = [
+    "pile.resistance_10_percent_diameter",
+    "pile.resistance_davisson",
+    "pile.resistance_chin",
 ];
 
 /// A run, read back.
 struct Run {
-    summary: Value,
+    summary: Summary,
     /// Its settings, as texts, by dotted path.
     settings: IndexMap<String, String>,
 }
@@ -46,15 +47,41 @@ pub fn of(folders: &[PathBuf]) -> Result<String, Error> {
         if found.len() == before {
             let why = "there is no run in this folder, nor in those below";
             let why = io::Error::new(io::ErrorKind::NotFound, why);
-            return Err(unreadable(&folder.join(SUMMARY), why));
+            return Err(unreadable(&folder.join(FILE_NAME), why));
         }
     }
     let mut seen = IndexSet::new();
     found.retain(|folder| seen.insert(folder.canonicalize().unwrap_or_else(|_| folder.clone())));
-    let runs = found.iter().map(|folder| Run::read(folder));
-    let runs = runs.collect::<Result<Vec<Run>, _>>()?;
+    let runs = found
+        .iter()
+        .map(|folder| Ok(Run::of(Summary::read(folder)?)));
+    let runs = runs.collect::<Result<Vec<Run>, Error>>()?;
     written(&names(&found), &runs)
-        .map_err(|error| Error::Internal(format!("the table of runs: {error}")))
+}
+
+/// Columns of the resistances of piles, where a run has one.
+fn columns_of_pile<'s>(
+    mut summaries: impl Iterator<Item = &'s Summary>,
+) -> &'static [&'static str] {
+    if summaries.any(|summary| summary.pile.is_some()) {
+        &OF_PILE
+    } else {
+        &[]
+    }
+}
+
+/// The cells of these columns.
+fn cells_of_pile(pile: Option<&Resistances>, columns: &[&str]) -> Vec<String> {
+    let loads = |pile: &Resistances| {
+        [
+            pile.resistance_10_percent_diameter,
+            pile.resistance_davisson,
+            pile.resistance_chin,
+        ]
+    };
+    let loads = pile.map_or([None; 3], loads);
+    let loads = loads.into_iter().take(columns.len());
+    loads.map(|load| shown(&json!(load))).collect()
 }
 
 /// The table of a study: all runs, whatever their outcome, with parameters, outputs, and the reason
@@ -66,60 +93,48 @@ fn of_study(folder: &Path) -> Result<String, Error> {
     for row in &rows {
         let place = folder.join(&row.folder);
         // Of an earlier study there may be more.
-        let has_results = row.standing.state != State::Planned && place.join(SUMMARY).is_file();
+        let has_results = row.standing.state != State::Planned && place.join(FILE_NAME).is_file();
         let summary = if has_results {
             // Of many runs only what the table has is kept.
-            let mut summary = Run::read_summary(&place)?;
-            json!({ "probes": summary["probes"].take(), "pile": summary["pile"].take() })
+            let Summary { probes, pile, .. } = Summary::read(&place)?;
+            Summary {
+                pile,
+                probes,
+                ..Summary::default()
+            }
         } else {
-            Value::Null
+            Summary::default()
         };
         runs.push((row, summary, History::read_if(has_results, &place)));
     }
     let summaries = || runs.iter().map(|(_, summary, _)| summary);
-    let counted: IndexSet<&str> = record
-        .outputs
-        .iter()
-        .map(|output| output.name.as_str())
-        .collect();
+    let outputs = record.outputs.iter();
+    let counted: IndexSet<&str> = outputs.map(|output| output.name.as_str()).collect();
     let probes: IndexSet<&str> = summaries()
-        .flat_map(|summary| entries(&summary["probes"]).map(|(name, _)| name))
+        .flat_map(|summary| summary.probes.keys().map(String::as_str))
         .filter(|name| !counted.contains(name))
         .collect();
-    let has_pile = summaries().any(|summary| summary["pile"].is_object());
-    let resistances = if has_pile { &RESISTANCES[..] } else { &[] };
-    let parameters = record
-        .parameters
-        .iter()
-        .map(|parameter| parameter.name.as_str());
-    let of_pile = resistances.iter().map(|name| format!("pile.{name}"));
-    let mut header: Vec<String> = ["run", "status"].map(str::to_owned).to_vec();
-    header.extend(
-        parameters
-            .chain(counted)
-            .chain(probes.iter().copied())
-            .map(str::to_owned),
-    );
-    header.extend(of_pile.chain(["reason".to_owned()]));
+    let of_pile = columns_of_pile(summaries());
+    let parameters = record.parameters.iter();
+    let parameters = parameters.map(|parameter| parameter.name.as_str());
+    let header = ["run", "status"].into_iter().chain(parameters);
+    let header = header.chain(counted).chain(probes.iter().copied());
+    let header = header.chain(of_pile.iter().copied()).chain(["reason"]);
     let body = runs.iter().map(|(row, summary, history)| {
         let mut cells = vec![row.folder.clone(), row.standing.state.word().to_owned()];
         cells.extend(row.values.iter().cloned());
         let outputs = record.outputs.iter().map(|output| history.output(output));
-        cells.extend(outputs.map(|value| value.map(|v| shown(&v.into())).unwrap_or_default()));
-        cells.extend(probes.iter().map(|probe| shown(&summary["probes"][probe])));
-        cells.extend(resistances.iter().map(|name| shown(&summary["pile"][name])));
+        cells.extend(outputs.map(|value| shown(&json!(value))));
+        cells.extend(
+            probes
+                .iter()
+                .map(|probe| shown(&json!(summary.probes.get(*probe)))),
+        );
+        cells.extend(cells_of_pile(summary.pile.as_ref(), of_pile));
         cells.push(row.standing.reason.clone());
         cells
     });
-    let table = || -> Result<String, Box<dyn std::error::Error>> {
-        let mut table = csv::Writer::from_writer(Vec::new());
-        table.write_record(&header)?;
-        for row in body {
-            table.write_record(&row)?;
-        }
-        Ok(String::from_utf8(table.into_inner()?)?)
-    };
-    table().map_err(|error| Error::Internal(format!("the table of runs: {error}")))
+    comma_separated(iter::once(header.map(str::to_owned).collect()).chain(body))
 }
 
 fn unreadable(path: &Path, source: io::Error) -> Error {
@@ -131,7 +146,7 @@ fn unreadable(path: &Path, source: io::Error) -> Error {
 
 /// The folders of runs at or below this one, in the order of their names.
 fn find(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), Error> {
-    if folder.join(SUMMARY).exists() {
+    if folder.join(FILE_NAME).exists() {
         found.push(folder.to_owned());
         return Ok(());
     }
@@ -150,32 +165,9 @@ fn find(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), Error> {
 }
 
 impl Run {
-    fn read(folder: &Path) -> Result<Self, Error> {
-        Ok(Self::of(Self::read_summary(folder)?))
-    }
-
-    fn read_summary(folder: &Path) -> Result<Value, Error> {
-        let path = folder.join(SUMMARY);
-        let text = std::fs::read_to_string(&path).map_err(|why| unreadable(&path, why))?;
-        let summary: Value = serde_json::from_str(&text).map_err(|error| {
-            let lines = text.split_inclusive('\n').take(error.line().max(1) - 1);
-            let at = lines.map(str::len).sum::<usize>() + error.column().max(1) - 1;
-            let at = (0..=at.min(text.len())).rfind(|&at| text.is_char_boundary(at));
-            let at = at.unwrap_or(0);
-            let message = format!("not written by a run: {error}");
-            Source::new(&path, text.as_str()).error(at..at, message)
-        })?;
-        if !summary["status"].is_string() {
-            let source = Source::new(&path, "");
-            let message = format!("not written by a run: {} has no `status`", path.display());
-            return Err(source.error(0..0, message).into());
-        }
-        Ok(summary)
-    }
-
-    fn of(summary: Value) -> Self {
+    fn of(summary: Summary) -> Self {
         // What a run was computed with counts more than what its file says of it.
-        let of_files = settings_of_files(&summary).into_iter();
+        let of_files = settings_of_files(&summary.head).into_iter();
         let of_run = settings(&summary).into_iter();
         let of_run = of_run.filter_map(|setting| Some((setting.path?, setting.value)));
         let settings = of_files.chain(of_run).map(|(path, v)| (path, shown(&v)));
@@ -197,8 +189,8 @@ impl Run {
 
     /// How it ended.
     fn status(&self) -> &str {
-        match text(&self.summary["status"]) {
-            "running" => "unfinished",
+        match self.summary.ending.status.as_str() {
+            RUNNING => "unfinished",
             status => status,
         }
     }
@@ -228,37 +220,23 @@ fn differing(runs: &[Run]) -> Vec<&str> {
     paths.into_iter().filter(differs).collect()
 }
 
-fn written(names: &[String], runs: &[Run]) -> Result<String, Box<dyn std::error::Error>> {
+fn written(names: &[String], runs: &[Run]) -> Result<String, Error> {
     let settings = differing(runs);
-    let probes: IndexSet<&str> = runs
-        .iter()
-        .flat_map(|run| entries(&run.summary["probes"]).map(|(name, _)| name))
-        .collect();
-    let has_pile = runs.iter().any(|run| run.summary["pile"].is_object());
-    let resistances = if has_pile { &RESISTANCES[..] } else { &[] };
-    let mut table = csv::Writer::from_writer(Vec::new());
-    let mut header: Vec<String> = ["run", "status"].map(str::to_owned).to_vec();
-    header.extend(settings.iter().chain(&probes).map(ToString::to_string));
-    header.extend(resistances.iter().map(|name| format!("pile.{name}")));
-    table.write_record(&header)?;
-    for (name, run) in names.iter().zip(runs) {
+    let probes = runs.iter().flat_map(|run| run.summary.probes.keys());
+    let probes: IndexSet<&str> = probes.map(String::as_str).collect();
+    let of_pile = columns_of_pile(runs.iter().map(|run| &run.summary));
+    let header = ["run", "status"].iter().chain(&settings).chain(&probes);
+    let header = header.chain(of_pile).map(ToString::to_string).collect();
+    let body = names.iter().zip(runs).map(|(name, run)| {
         let mut row = vec![name.clone(), run.status().to_owned()];
         let of_settings = settings.iter().map(|path| run.settings.get(*path));
         row.extend(of_settings.map(|value| value.cloned().unwrap_or_default()));
-        row.extend(
-            probes
-                .iter()
-                .map(|probe| shown(&run.summary["probes"][probe])),
-        );
-        let pile = &run.summary["pile"];
-        row.extend(
-            resistances
-                .iter()
-                .map(|resistance| shown(&pile[resistance])),
-        );
-        table.write_record(&row)?;
-    }
-    Ok(String::from_utf8(table.into_inner()?)?)
+        let last = &run.summary.probes;
+        row.extend(probes.iter().map(|probe| shown(&json!(last.get(*probe)))));
+        row.extend(cells_of_pile(run.summary.pile.as_ref(), of_pile));
+        row
+    });
+    comma_separated(iter::once(header).chain(body))
 }
 
 /// A value in a cell; nothing, where absent. A number has all its digits.
@@ -279,10 +257,14 @@ pub(crate) fn shown(value: &Value) -> String {
 mod tests {
     use super::*;
 
+    fn run(summary: Value) -> Run {
+        Run::of(serde_json::from_value(summary).unwrap())
+    }
+
     #[test]
     fn a_row_has_what_differs_and_what_came_out() {
         let with = |c: f64, status: &str, pile: Value| {
-            Run::of(json!({
+            run(json!({
                 "status": status,
                 "case_files": [{
                     "path": "case.toml",
@@ -314,7 +296,7 @@ mod tests {
             let mut laws = json!({ "soil (solid_2d)": { "law": "l", "parameters": { "c": c } } });
             let joint = json!({ "law": "j", "sha256": law, "parameters": { "k": 1.0 } });
             laws[format!("{law} (interface_2d)")] = joint;
-            Run::of(json!({
+            run(json!({
                 "status": "done",
                 "laws": laws,
                 "case_files": [{
@@ -334,7 +316,7 @@ mod tests {
 
     #[test]
     fn runs_alike_have_no_settings() {
-        let alike = || Run::of(json!({ "status": "done", "analysis": "axisymmetric" }));
+        let alike = || run(json!({ "status": "done", "analysis": "axisymmetric" }));
         let names = ["a", "b"].map(str::to_owned);
         let table = written(&names, &[alike(), alike()]).unwrap();
         assert_eq!(table, "run,status\na,done\nb,done\n");
@@ -355,13 +337,13 @@ mod tests {
             let law = json!({
                 "law": "l", "parameters": { "c": 1.0 }, "shear_zone": zone, "initial": initial,
             });
-            Run::of(json!({ "status": "done", "laws": { "a (interface_2d)": law } }))
+            run(json!({ "status": "done", "laws": { "a (interface_2d)": law } }))
         };
         let zone = |ratio: f64| json!({ "thickness": 0.005, "lateral_ratio": ratio });
         let runs = [
             with(zone(1.0), json!({})),
             with(zone(0.5), json!({ "zone_stress_11": -40.0 })),
-            Run::of(json!({ "status": "done", "laws": { "other (solid_2d)": { "law": "m" } } })),
+            run(json!({ "status": "done", "laws": { "other (solid_2d)": { "law": "m" } } })),
         ];
         let expected = ["laws.a.lateral_ratio", "laws.a.initial.zone_stress_11"];
         assert_eq!(differing(&runs), expected);

@@ -13,12 +13,13 @@ pub use history::History;
 pub use indices::{Estimate, Indices, indices};
 
 use crate::run_table::shown;
+use crate::table::comma_separated;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, TryLockError};
-use std::io;
 use std::path::{Path, PathBuf};
+use std::{io, iter};
 use text::Error;
 use text::write::replace_whole;
 
@@ -117,7 +118,8 @@ impl Output {
 }
 
 /// How far a run has come.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(from = "String", into = "String")]
 pub enum State {
     /// Nothing was done yet.
     Planned,
@@ -146,25 +148,34 @@ impl State {
         }
     }
 
-    fn of_word(word: &str) -> Self {
-        match word {
-            "planned" => Self::Planned,
-            "running" => Self::Running,
-            "lost" => Self::Lost,
-            "interrupted" => Self::Interrupted,
-            "done" => Self::Done,
-            status => Self::Failed(status.to_owned()),
-        }
-    }
-
     /// Whether nothing is left to be done.
     pub fn is_final(&self) -> bool {
         matches!(self, Self::Done | Self::Failed(_))
     }
 }
 
+impl From<State> for String {
+    fn from(state: State) -> Self {
+        state.word().to_owned()
+    }
+}
+
+impl From<String> for State {
+    fn from(word: String) -> Self {
+        let all = [
+            Self::Planned,
+            Self::Running,
+            Self::Lost,
+            Self::Interrupted,
+            Self::Done,
+        ];
+        let same = all.into_iter().find(|state| state.word() == word);
+        same.unwrap_or(Self::Failed(word))
+    }
+}
+
 /// A run's state, with the reason where there is one.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Standing {
     /// How far it has come.
     pub state: State,
@@ -186,8 +197,8 @@ impl Standing {
 #[derive(Debug, Serialize, Deserialize)]
 struct RunRecord {
     identity: String,
-    state: String,
-    reason: String,
+    #[serde(flatten)]
+    standing: Standing,
 }
 
 /// The folder of a run, held by the process that carries it out.
@@ -230,8 +241,7 @@ impl Held {
             &self.folder,
             &RunRecord {
                 identity: self.identity.clone(),
-                state: standing.state.word().to_owned(),
-                reason: standing.reason.clone(),
+                standing: standing.clone(),
             },
         )
     }
@@ -293,7 +303,7 @@ pub fn standing(folder: &Path) -> Standing {
     let Some(record) = read_run(folder) else {
         return Standing::plain(State::Planned);
     };
-    match State::of_word(&record.state) {
+    match record.standing.state {
         // Without a lock to be had, nobody is there any more.
         State::Running if !is_held(folder) => Standing::plain(State::Lost),
         // What was done has its results; a run without them has been, and is begun anew.
@@ -301,10 +311,7 @@ pub fn standing(folder: &Path) -> Standing {
             state: State::Lost,
             reason: "its history.csv is gone, or has no rows".to_owned(),
         },
-        state => Standing {
-            state,
-            reason: record.reason,
-        },
+        _ => record.standing,
     }
 }
 
@@ -319,10 +326,9 @@ fn is_held(folder: &Path) -> bool {
 /// [`Error::Unwritable`].
 pub fn end_run(folder: &Path, standing: &Standing) -> Result<bool, Error> {
     match read_run(folder) {
-        Some(mut record) if record.state == State::Running.word() => {
-            standing.state.word().clone_into(&mut record.state);
-            standing.reason.clone_into(&mut record.reason);
-            write_run(folder, &record)?;
+        Some(record) if record.standing.state == State::Running => {
+            let standing = standing.clone();
+            write_run(folder, &RunRecord { standing, ..record })?;
             Ok(true)
         }
         _ => Ok(false),
@@ -390,26 +396,17 @@ impl Record {
     /// [`Error::Unwritable`].
     pub fn write_table(&self, folder: &Path, rows: &[Row]) -> Result<(), Error> {
         let path = folder.join(TABLE);
-        let table = self
-            .table(rows)
-            .map_err(|error| Error::unwritable(&path, io::Error::other(error)))?;
-        replace_whole(&path, table)
-    }
-
-    fn table(&self, rows: &[Row]) -> Result<Vec<u8>, Box<dyn std::error::Error + Send + Sync>> {
-        let mut table = csv::Writer::from_writer(Vec::new());
-        table.write_record(self.columns())?;
-        for row in rows {
-            let index = row.index.to_string();
-            let first = [index.as_str(), &row.folder].into_iter();
-            let values = row.values.iter().map(String::as_str);
+        let body = rows.iter().map(|row| {
+            let mut cells = vec![row.index.to_string(), row.folder.clone()];
+            cells.extend(row.values.iter().cloned());
             let numbers = row.numbers.iter();
-            let numbers: Vec<String> = numbers.map(|number| shown(&(*number).into())).collect();
-            let numbers = numbers.iter().map(String::as_str);
-            let last = [row.standing.state.word(), &row.standing.reason];
-            table.write_record(first.chain(values).chain(numbers).chain(last))?;
-        }
-        Ok(table.into_inner()?)
+            cells.extend(numbers.map(|number| shown(&(*number).into())));
+            cells.push(row.standing.state.word().to_owned());
+            cells.push(row.standing.reason.clone());
+            cells
+        });
+        let table = comma_separated(iter::once(self.columns()).chain(body))?;
+        replace_whole(&path, table)
     }
 
     /// Names of the table's columns, each once: an output that is called as a column before it is marked.
@@ -473,7 +470,7 @@ impl Record {
                     .map(|cell| cell.parse().ok())
                     .collect(),
                 standing: Standing {
-                    state: State::of_word(cells[2 + n + m]),
+                    state: cells[2 + n + m].to_owned().into(),
                     reason: cells[3 + n + m].to_owned(),
                 },
             });

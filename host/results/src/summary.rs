@@ -1,587 +1,401 @@
-//! `summary.json`: what was run, with what, at what cost, and how it ended.
+//! `summary.json`: what was run, with what, at what cost, and how it ended; as it is written and read.
+//!
+//! Every field may be missing, as in files of an earlier version.
+
+mod progress;
+mod settings;
+
+pub use progress::{About, LawsOfGroup};
+pub(crate) use progress::{Course, Progress, Stopped};
+pub(crate) use settings::{RunSetting, names, settings, settings_of_files};
 
 use crate::mesh_error::OfPhase;
-use crate::output_request::{Figure, Measured, OutputRequest};
-use indexmap::IndexMap;
-use law::BuiltLaw;
-use mechanics::group::Group;
-use mechanics::simulation::{Increment, Neighbour, PhaseRecord};
-use mechanics::{Place, Settings, Simulation};
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value, json};
+use serde_json::{Map, Value};
 use std::collections::BTreeMap;
-use std::sync::Arc;
-use std::time::Duration;
+use std::path::Path;
+use text::write::replace_whole;
+use text::{Error, Source};
 
-/// Name of a group's own law, and phases with the laws that they give it.
-pub type LawsOfGroup = (String, Vec<(String, String)>);
+/// Name of the file.
+pub(crate) const FILE_NAME: &str = "summary.json";
 
-/// What the record says of a run next to what the simulation knows.
-#[derive(Clone, Debug, Default)]
-pub struct About {
-    /// Name of the case.
-    pub case: String,
-    /// Name of the variant, if it is one.
-    pub variant: Option<String>,
-    /// Title of the case.
-    pub title: String,
-    /// SHA-256 of the text of its files.
-    pub sha256: String,
-    /// Those files: path and text, the case itself last.
-    pub files: Vec<(String, String)>,
-    /// Settings of the command line, `KEY=VALUE`, in the order given.
-    pub settings: Vec<String>,
-    /// Path and SHA-256 of the file of the mesh, if it has one.
-    pub mesh_file: Option<(String, String)>,
-    /// For every group the name of its law, and those of the laws that phases give it, by phase.
-    pub laws_of_groups: Vec<LawsOfGroup>,
-    /// All laws used, by name and hypothesis.
-    pub laws: IndexMap<(String, &'static str), Arc<BuiltLaw>>,
-    /// Units of the probes, where factors leave no doubt.
-    pub probe_units: Vec<(String, Option<String>)>,
-    /// Settings that a study has chosen.
-    pub chosen: Option<Value>,
+/// Values by name.
+pub(crate) type Named<T> = BTreeMap<String, T>;
+
+/// The record of a run.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Summary {
+    #[serde(flatten)]
+    pub(crate) head: Head,
+    #[serde(flatten)]
+    pub(crate) ending: Ending,
+    /// None before a run has ended.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) warnings: Option<Vec<String>>,
+    /// Phases that ended.
+    pub phases: Vec<Phase>,
+    pub(crate) law_calls: Named<LawCalls>,
+    /// Points carried through laws, by group.
+    pub law_calls_by_group: Named<u64>,
+    pub(crate) operators_by_group: Named<u64>,
+    pub(crate) state_bytes: Named<Value>,
+    pub(crate) last_equilibrium: Option<Increment>,
+    pub(crate) stopped_at: Option<Stop>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) mesh_error: Option<Vec<OfPhase>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) pile: Option<Resistances>,
+    pub(crate) probes: Named<Option<f64>>,
+    /// The largest values that the probes could have had, by probe.
+    pub probe_magnitudes: Named<Option<f64>>,
+    pub(crate) seconds: Seconds,
+}
+
+/// What is known before the first increment.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Head {
+    pub(crate) program: String,
+    pub(crate) case: String,
+    pub(crate) variant: Option<String>,
+    pub(crate) title: String,
+    pub(crate) case_sha256: String,
+    pub(crate) case_files: Vec<CaseFile>,
+    pub(crate) set: Vec<String>,
+    pub(crate) analysis: String,
+    pub(crate) groups: Vec<Group>,
+    pub(crate) solver: Map<String, Value>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) accuracy: Option<Value>,
+    pub(crate) figures: Vec<Figure>,
+    pub(crate) pictures: Vec<String>,
+    pub(crate) probe_units: Named<Option<String>>,
+    pub(crate) laws: Named<Law>,
+    pub(crate) mesh: Mesh,
 }
 
 /// How a run ended.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Ending {
     /// In a word.
-    pub status: &'static str,
+    pub status: String,
     /// What went wrong, if something did.
     pub error: Option<String>,
     /// What gave way where no equilibrium was found.
     pub mechanism: Option<Value>,
 }
 
+/// The status of a run that goes on.
+pub(crate) const RUNNING: &str = "running";
+/// The status of a run that came to its end.
+pub(crate) const DONE: &str = "done";
+
 impl Ending {
     /// A run that came to its end.
     pub fn done() -> Self {
         Self {
-            status: "done",
-            error: None,
-            mechanism: None,
+            status: DONE.to_owned(),
+            ..Self::default()
         }
     }
 }
 
-/// State of a run so far.
-#[derive(Debug)]
-pub(crate) struct Summary {
-    head: Map<String, Value>,
-    probe_names: Vec<String>,
-    /// The error of the mesh is asked for.
-    estimates_mesh: bool,
-    pub(crate) course: Course,
-}
-
-/// The last state of equilibrium of a phase that could not go on.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub(crate) struct Stopped {
-    pub(crate) phase: String,
-    pub(crate) load_factor: f64,
-    pub(crate) time: f64,
-    pub(crate) probes: Vec<Option<f64>>,
-}
-
-/// Events so far.
+/// A file of a case.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub(crate) struct Course {
-    /// Phases, with the values of the probes after their last increments.
-    phases: Vec<(PhaseRecord, Vec<Option<f64>>)>,
-    last: Option<(Place, Vec<Option<f64>>)>,
-    /// The phase that found the ground at rest, but for this share of its weight.
-    pub(crate) at_rest: Option<(String, f64)>,
-    /// Where a phase could not go on.
-    pub(crate) stopped: Option<Stopped>,
-    /// The error of the mesh at the end of each phase, where it was asked for.
-    pub(crate) mesh_errors: Vec<OfPhase>,
-    /// How large the quantities of the probes are in the model at the end of any phase, where it is known.
-    #[serde(default)]
-    pub(crate) sizes: Vec<f64>,
-    /// By phase, the first increment with a result that a law calls inaccurate, and why.
-    unreliable: Vec<(Place, String)>,
+#[serde(default)]
+pub(crate) struct CaseFile {
+    pub(crate) path: String,
+    pub(crate) text: String,
 }
 
-impl Summary {
-    pub(crate) fn new(about: &About, wanted: &OutputRequest, simulation: &Simulation) -> Self {
-        let laws: Map<String, Value> = about
-            .laws
-            .iter()
-            .map(|((name, hypothesis), built)| {
-                let mut entry = law(built);
-                let initial = initial(simulation, name, built);
-                if !initial.is_empty() {
-                    entry["initial"] = initial.into();
-                }
-                (format!("{name} ({hypothesis})"), entry)
-            })
-            .collect();
-        let of_groups = simulation.groups().iter();
-        let elements: Map<String, Value> = of_groups
-            .map(|g| (g.name.clone(), g.kinematics.n_elements().into()))
-            .collect();
-        let problem = simulation.problem();
-        let mut head = Map::new();
-        let mut say = |key: &str, value: Value| head.insert(key.to_owned(), value);
-        say(
-            "program",
-            json!(format!("pilum {}", env!("CARGO_PKG_VERSION"))),
-        );
-        say("case", json!(about.case));
-        say("variant", json!(about.variant));
-        say("title", json!(about.title));
-        say("case_sha256", json!(about.sha256));
-        let file = |(path, text): &(String, String)| json!({ "path": path, "text": text });
-        say("case_files", about.files.iter().map(file).collect());
-        say("set", json!(about.settings));
-        say("analysis", json!(problem.analysis.name()));
-        say("groups", groups(about, simulation));
-        say("solver", solver(&problem.settings));
-        if let Some(chosen) = &about.chosen {
-            say("accuracy", chosen.clone());
-        }
-        say("figures", figures(&wanted.figures));
-        let pictures = wanted.figures.iter();
-        let pictures = pictures.map(|figure| format!("{}.svg", figure.name));
-        say("pictures", json!(pictures.collect::<Vec<String>>()));
-        let units = about.probe_units.iter();
-        let mut units: Map<String, Value> = units
-            .map(|(name, unit)| (name.clone(), json!(unit)))
-            .collect();
-        if wanted.pile.is_some() {
-            for column in crate::pile::COLUMNS {
-                let is_length = column == "pile_settlement";
-                let unit = if is_length {
-                    "m"
-                } else {
-                    problem.analysis.force_unit()
-                };
-                units.insert(column.to_owned(), json!(unit));
-            }
-        }
-        say("probe_units", units.into());
-        say("laws", laws.into());
-        let mut mesh = json!({
-            "nodes": problem.mesh.nodes.len(),
-            "elements": problem.mesh.solids.len() + problem.mesh.joints.len(),
-            "elements_by_group": elements,
-        });
-        if let Some((path, sha256)) = &about.mesh_file {
-            mesh["file"] = json!({ "path": path, "sha256": sha256 });
-        }
-        say("mesh", mesh);
-        Self {
-            head,
-            probe_names: wanted.columns().map(str::to_owned).collect(),
-            estimates_mesh: wanted.output.mesh_error,
-            course: Course::default(),
-        }
-    }
-
-    /// Data known before the first increment.
-    pub(crate) fn running(&self) -> Value {
-        let mut summary = self.head.clone();
-        summary.insert("status".to_owned(), json!("running"));
-        summary.into()
-    }
-
-    pub(crate) fn last_increment(&mut self, increment: &Increment, probes: Vec<Option<f64>>) {
-        let place = &increment.place;
-        self.course.last = Some((place.clone(), probes));
-        let is_first = self
-            .course
-            .unreliable
-            .last()
-            .is_none_or(|(p, _)| p.phase != place.phase);
-        if let Some(why) = increment.unreliable.as_ref().filter(|_| is_first) {
-            self.course.unreliable.push((place.clone(), why.clone()));
-        }
-    }
-
-    /// Warnings about results that laws call inaccurate, one for each phase that has any.
-    pub(crate) fn unreliable(&self) -> Vec<String> {
-        let phases = self
-            .course
-            .phases
-            .iter()
-            .map(|(phase, _)| phase)
-            .filter(|phase| phase.unreliable > 0);
-        let warning = |phase: &PhaseRecord| {
-            let first = self
-                .course
-                .unreliable
-                .iter()
-                .find(|(p, _)| p.phase == phase.name);
-            let first =
-                first.map(|(p, why)| format!("; first in increment {}: {why}", p.increment));
-            format!(
-                "phase `{}`: {} step{} with results that a law calls inaccurate{}",
-                phase.name,
-                phase.unreliable,
-                if phase.unreliable == 1 { "" } else { "s" },
-                first.unwrap_or_default()
-            )
-        };
-        phases.map(warning).collect()
-    }
-
-    pub(crate) fn phase(&mut self, record: PhaseRecord) {
-        let last = self
-            .course
-            .last
-            .as_ref()
-            .filter(|(place, _)| place.phase == record.name);
-        let probes = last.map(|(_, probes)| probes.clone()).unwrap_or_default();
-        self.course.phases.push((record, probes));
-    }
-
-    fn probes(&self, values: &[Option<f64>]) -> Value {
-        let pairs = self.probe_names.iter().zip(values);
-        pairs
-            .map(|(name, value)| (name.clone(), json!(value)))
-            .collect::<Map<_, _>>()
-            .into()
-    }
-
-    /// The whole summary. `seconds`: in total, and for output.
-    pub(crate) fn finish(
-        &self,
-        groups: &[Group],
-        [total, output]: [Duration; 2],
-        warnings: &[String],
-        ending: &Ending,
-    ) -> Value {
-        let mut summary = self.head.clone();
-        summary.insert("status".to_owned(), ending.status.into());
-        summary.insert("error".to_owned(), json!(ending.error));
-        summary.insert("mechanism".to_owned(), json!(ending.mechanism));
-        summary.insert("warnings".to_owned(), json!(warnings));
-        let at_rest = |phase: &str| {
-            let found = self.course.at_rest.as_ref().filter(|(of, _)| of == phase);
-            found.map(|(_, share)| share)
-        };
-        let phases: Vec<Value> = self
-            .course
-            .phases
-            .iter()
-            .map(|(p, probes)| {
-                json!({
-                    "name": p.name,
-                    "method": p.method.name(),
-                    "equations": p.equations,
-                    "out_of_balance": p.out_of_balance,
-                    "at_rest": at_rest(&p.name),
-                    "increments": p.increments,
-                    "iterations": p.iterations,
-                    "cut_backs": p.cut_backs,
-                    "cut_back_in_halves": in_halves(p.in_halves),
-                    "unreliable_steps": p.unreliable,
-                    "relaxed_steps": p.relaxed,
-                    "viscous_steps": p.viscous,
-                    "viscous_from": p.viscous_from,
-                    "single_corrections_from": p.singly_from,
-                    "tolerated_steps": p.tolerated,
-                    "tolerated_residual": p.tolerated_residual,
-                    "tolerated_force": p.tolerated_force,
-                    "by_force_steps": p.by_force,
-                    "by_force_open": {
-                        "residual": p.open.residual,
-                        "force": p.open.force,
-                        "correction": p.open.correction,
-                        "nodes": p.open.nodes,
-                    },
-                    "arc_length_steps": p.arc_length,
-                    "factorisations": p.factorisations,
-                    "fallbacks": p.fallbacks,
-                    "evaluations": p.costs.evaluations,
-                    "seconds": {
-                        "laws_and_forces": p.costs.laws.as_secs_f64(),
-                        "assembly": p.costs.assembly.as_secs_f64(),
-                        "equations": p.costs.equations.as_secs_f64(),
-                    },
-                    "probes": self.probes(probes),
-                })
-            })
-            .collect();
-        summary.insert("phases".to_owned(), phases.into());
-        let work = |work: fn(&Group) -> Value| -> Value {
-            let of_groups = groups.iter().map(|group| (group.name.clone(), work(group)));
-            of_groups.collect::<Map<_, _>>().into()
-        };
-        let points = |group: &Group| group.law_calls.iter().map(|c| c.points).sum::<u64>().into();
-        let operators = |group: &Group| {
-            let operators = group.law_calls.iter().map(|c| c.operators);
-            operators.sum::<u64>().into()
-        };
-        summary.insert("law_calls".to_owned(), law_calls(groups));
-        summary.insert("law_calls_by_group".to_owned(), work(points));
-        summary.insert("operators_by_group".to_owned(), work(operators));
-        summary.insert("state_bytes".to_owned(), work(|group| json!(group.bytes())));
-        let last = self.course.last.as_ref();
-        summary.insert(
-            "last_equilibrium".to_owned(),
-            json!(last.map(|(place, _)| json!({
-                "phase": place.phase,
-                "increment": place.increment,
-            }))),
-        );
-        let stopped = self.course.stopped.as_ref();
-        summary.insert(
-            "stopped_at".to_owned(),
-            json!(stopped.map(|stopped| json!({
-                "phase": stopped.phase,
-                "load_factor": stopped.load_factor,
-                "time": stopped.time,
-                "probes": self.probes(&stopped.probes),
-            }))),
-        );
-        if self.estimates_mesh || !self.course.mesh_errors.is_empty() {
-            summary.insert("mesh_error".to_owned(), json!(self.course.mesh_errors));
-        }
-        let values = last
-            .map(|(_, values)| values.as_slice())
-            .unwrap_or_default();
-        summary.insert("probes".to_owned(), self.probes(values));
-        let sizes: Vec<Option<f64>> = self.course.sizes.iter().copied().map(Some).collect();
-        summary.insert("probe_magnitudes".to_owned(), self.probes(&sizes));
-        summary.insert(
-            "seconds".to_owned(),
-            json!({ "total": total.as_secs_f64(), "output": output.as_secs_f64() }),
-        );
-        summary.into()
-    }
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Group {
+    pub(crate) name: String,
+    pub(crate) formulation: String,
+    pub(crate) elements: Option<usize>,
+    /// A number; in words where there are triangles and quads.
+    pub(crate) points_per_element: Value,
+    pub(crate) law: String,
+    pub(crate) laws_from_phase: Named<String>,
 }
 
-/// Points carried through every law, and how many of them with an operator, by the law's name in the case.
-fn law_calls(groups: &[Group]) -> Value {
-    let mut totals: BTreeMap<&str, [u64; 2]> = BTreeMap::new();
-    for calls in groups.iter().flat_map(|group| &group.law_calls) {
-        let [points, operators] = totals.entry(&calls.law).or_default();
-        *points += calls.points;
-        *operators += calls.operators;
-    }
-    let of_laws = totals.into_iter();
-    of_laws
-        .map(|(law, [points, operators])| {
-            let calls = json!({ "points": points, "operators": operators });
-            (law.to_owned(), calls)
-        })
-        .collect::<Map<_, _>>()
-        .into()
-}
-
-/// Groups in the order of the problem, which is that of the numbers in the fields.
-fn groups(about: &About, simulation: &Simulation) -> Value {
-    let groups = simulation.groups().iter().zip(&about.laws_of_groups);
-    let describe = |(group, (law, from_phase)): (&Group, &LawsOfGroup)| {
-        let swaps = from_phase.iter();
-        let swaps: Map<String, Value> = swaps
-            .map(|(phase, law)| (phase.clone(), json!(law)))
-            .collect();
-        json!({
-            "name": group.name,
-            "formulation": group.formulation.name(),
-            "elements": group.kinematics.n_elements(),
-            "points_per_element": points_per_element(group),
-            "law": law,
-            "laws_from_phase": swaps,
-        })
-    };
-    groups.map(describe).collect()
-}
-
-/// Points of an element; in words where there are triangles and quads.
-fn points_per_element(group: &Group) -> Value {
-    let elements = 0..group.kinematics.n_elements();
-    let mut counts: Vec<usize> = elements
-        .map(|element| group.kinematics.points_of(element).len())
-        .collect();
-    counts.sort_unstable();
-    counts.dedup();
-    if let [n] = counts[..] {
-        return json!(n);
-    }
-    let counts: Vec<String> = counts.iter().map(usize::to_string).collect();
-    json!(counts.join(" or "))
-}
-
-fn solver(solver: &Settings) -> Value {
-    json!({
-        "method": solver.method.name(),
-        "force_tolerance": solver.force_tolerance,
-        "displacement_tolerance": solver.displacement_tolerance,
-        "max_iterations": solver.max_iterations(),
-        "max_halvings": solver.max_halvings,
-        "line_search": solver.line_search,
-        "relaxation": solver.relaxation,
-        "control": solver.control,
-        "convergence": solver.convergence,
-        "tolerated_residual": solver.tolerated_residual,
-        "tangents": solver.tangents,
-        "equations": solver.equations,
-    })
+/// A figure of probes; the page has its fields in this order.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Figure {
+    /// None where another figure of the page has them already.
+    pub(crate) measured: Option<Vec<Measured>>,
+    pub(crate) name: String,
+    pub(crate) phase: Option<String>,
+    pub(crate) title: Option<String>,
+    pub(crate) x: String,
+    pub(crate) x_label: Option<String>,
+    pub(crate) y: Vec<String>,
+    pub(crate) y_label: Option<String>,
 }
 
 /// Measured points by coordinate.
-fn measured(measured: &Measured) -> Value {
-    let (x, y): (Vec<f64>, Vec<f64>) = measured.points.iter().copied().unzip();
-    json!({ "label": measured.label, "x": x, "y": y })
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Measured {
+    pub(crate) label: String,
+    pub(crate) x: Vec<f64>,
+    pub(crate) y: Vec<f64>,
 }
 
-/// Figures of probes; those of cuts have nothing in `history.csv`.
-fn figures(figures: &[Figure]) -> Value {
-    let figure = |figure: &Figure| {
-        json!({
-            "name": figure.name,
-            "title": figure.title,
-            "x": figure.x,
-            "x_label": figure.x_label,
-            "y": figure.y,
-            "y_label": figure.y_label,
-            "phase": figure.phase,
-            "measured": figure.measured.iter().map(measured).collect::<Vec<_>>(),
-        })
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+#[expect(clippy::struct_field_names, reason = "names of the file")]
+pub(crate) struct Law {
+    pub(crate) law: String,
+    pub(crate) name: String,
+    pub(crate) doc: String,
+    pub(crate) references: String,
+    pub(crate) version: String,
+    pub(crate) library: String,
+    pub(crate) sha256: String,
+    pub(crate) parameters: Named<Option<f64>>,
+    pub(crate) described_parameters: Vec<Parameter>,
+    pub(crate) internal_variables: Vec<Variable>,
+    pub(crate) warnings: Vec<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) shear_zone: Option<ShearZone>,
+    #[serde(skip_serializing_if = "Named::is_empty")]
+    pub(crate) initial: Named<f64>,
+}
+
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Parameter {
+    pub(crate) id: String,
+    pub(crate) symbol: String,
+    pub(crate) unit: String,
+    pub(crate) value: Option<f64>,
+    pub(crate) choice: Option<String>,
+    pub(crate) by_default: Option<bool>,
+    pub(crate) bounds: String,
+    pub(crate) doc: String,
+}
+
+/// An internal variable.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Variable {
+    pub(crate) id: String,
+    pub(crate) symbol: String,
+    pub(crate) unit: String,
+    pub(crate) doc: String,
+}
+
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct ShearZone {
+    pub(crate) thickness: Option<f64>,
+    pub(crate) lateral_ratio: Option<f64>,
+}
+
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Mesh {
+    pub(crate) nodes: Option<usize>,
+    pub(crate) elements: Option<usize>,
+    pub(crate) elements_by_group: Named<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) file: Option<MeshFile>,
+}
+
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct MeshFile {
+    pub(crate) path: String,
+    pub(crate) sha256: String,
+}
+
+/// A phase that ended.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Phase {
+    pub(crate) name: String,
+    pub(crate) method: String,
+    pub(crate) equations: Option<usize>,
+    pub(crate) out_of_balance: Option<f64>,
+    pub(crate) at_rest: Option<f64>,
+    /// Increments that reached equilibrium.
+    pub increments: Option<u64>,
+    /// Iterations of these, failed attempts included.
+    pub iterations: Option<u64>,
+    /// Steps repeated with a smaller length.
+    pub cut_backs: Option<u64>,
+    /// Where two halves of a step after a cut-back lead: how far from the whole, or that they lead nowhere.
+    pub(crate) cut_back_in_halves: Value,
+    pub(crate) unreliable_steps: Option<u64>,
+    pub(crate) relaxed_steps: usize,
+    pub(crate) viscous_steps: usize,
+    pub(crate) viscous_from: Option<usize>,
+    pub(crate) single_corrections_from: Option<usize>,
+    pub(crate) tolerated_steps: usize,
+    pub(crate) tolerated_residual: Option<f64>,
+    pub(crate) tolerated_force: Option<f64>,
+    pub(crate) by_force_steps: usize,
+    pub(crate) by_force_open: LeftOpen,
+    pub(crate) arc_length_steps: usize,
+    /// Matrices factorised.
+    pub factorisations: Option<u64>,
+    pub(crate) fallbacks: u64,
+    pub(crate) evaluations: u64,
+    pub(crate) seconds: PhaseSeconds,
+    pub(crate) probes: Named<Option<f64>>,
+}
+
+/// The most that steps left open in which the residual alone decided.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct LeftOpen {
+    pub(crate) residual: Option<f64>,
+    pub(crate) force: Option<f64>,
+    pub(crate) correction: Option<f64>,
+    pub(crate) nodes: usize,
+}
+
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct PhaseSeconds {
+    pub(crate) laws_and_forces: Option<f64>,
+    pub(crate) assembly: Option<f64>,
+    pub(crate) equations: Option<f64>,
+}
+
+/// Points carried through a law, and how many of them with an operator.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct LawCalls {
+    pub(crate) points: u64,
+    pub(crate) operators: u64,
+}
+
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Increment {
+    pub(crate) phase: String,
+    pub(crate) increment: usize,
+}
+
+/// The last state of equilibrium of a phase that could not go on.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Stop {
+    pub(crate) phase: String,
+    pub(crate) load_factor: Option<f64>,
+    pub(crate) time: Option<f64>,
+    pub(crate) probes: Named<Option<f64>>,
+}
+
+/// Resistances of a pile, each with the reason where there is none; the page has its fields in this
+/// order.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Resistances {
+    pub(crate) base_at_10_percent_diameter: Option<f64>,
+    pub(crate) diameter: Option<f64>,
+    pub(crate) phase: Option<String>,
+    pub(crate) resistance_10_percent_diameter: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) resistance_10_percent_diameter_reason: Option<String>,
+    pub(crate) resistance_chin: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) resistance_chin_reason: Option<String>,
+    pub(crate) resistance_davisson: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) resistance_davisson_reason: Option<String>,
+    pub(crate) shaft_at_10_percent_diameter: Option<f64>,
+    /// Settlement, and loads of head, shaft and base, that its curve starts from.
+    pub(crate) start: Option<[f64; 4]>,
+    pub(crate) unit: String,
+    pub(crate) weight: Option<f64>,
+}
+
+/// In total, and for output.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Seconds {
+    pub(crate) total: Option<f64>,
+    pub(crate) output: Option<f64>,
+}
+
+/// A run that goes on, as far as its summary knows it.
+#[derive(Serialize)]
+pub(crate) struct Running<'s> {
+    #[serde(flatten)]
+    pub(crate) head: &'s Head,
+    pub(crate) status: &'static str,
+}
+
+impl Summary {
+    /// Reads that of a folder.
+    ///
+    /// # Errors
+    /// [`Error::Unreadable`]; [`Error::Input`] if it is not one that a run has written.
+    pub fn read(folder: &Path) -> Result<Self, Error> {
+        let path = folder.join(FILE_NAME);
+        let text = std::fs::read_to_string(&path).map_err(|source| Error::Unreadable {
+            path: path.clone(),
+            source,
+        })?;
+        let summary: Self = serde_json::from_str(&text).map_err(|error| {
+            let lines = text.split_inclusive('\n').take(error.line().max(1) - 1);
+            let at = lines.map(str::len).sum::<usize>() + error.column().max(1) - 1;
+            let at = (0..=at.min(text.len())).rfind(|&at| text.is_char_boundary(at));
+            let at = at.unwrap_or(0);
+            let message = format!("not written by a run: {error}");
+            Source::new(&path, text.as_str()).error(at..at, message)
+        })?;
+        if summary.ending.status.is_empty() {
+            let source = Source::new(&path, "");
+            let message = format!("not written by a run: {} has no `status`", path.display());
+            return Err(source.error(0..0, message).into());
+        }
+        Ok(summary)
+    }
+}
+
+/// Writes what a folder's summary says whole or not at all, its keys in the order of the alphabet.
+pub(crate) fn write(folder: &Path, summary: impl Serialize) -> Result<(), Error> {
+    let internal = |error: serde_json::Error| Error::Internal(error.to_string());
+    let summary = serde_json::to_value(summary).map_err(internal)?;
+    let text = serde_json::to_string_pretty(&summary).map_err(internal)?;
+    replace_whole(&folder.join(FILE_NAME), text + "\n")
+}
+
+/// Has the summary of a run that could not end it say how it ended. Whether there is one.
+///
+/// # Errors
+/// [`Error::Unreadable`] or [`Error::Unwritable`].
+pub fn end_summary(folder: &Path, ending: &Ending) -> Result<bool, Error> {
+    /// A summary whose other values stay as they are.
+    #[derive(Serialize, Deserialize)]
+    struct Ended {
+        #[serde(flatten)]
+        ending: Ending,
+        #[serde(flatten)]
+        rest: Map<String, Value>,
+    }
+
+    let path = folder.join(FILE_NAME);
+    if !path.is_file() {
+        return Ok(false);
+    }
+    let text = std::fs::read_to_string(&path).map_err(|source| Error::Unreadable {
+        path: path.clone(),
+        source,
+    })?;
+    let Ok(mut summary) = serde_json::from_str::<Ended>(&text) else {
+        return Ok(false);
     };
-    let of_probes = figures.iter().filter(|f| f.is_of_columns());
-    of_probes.map(figure).collect()
-}
-
-/// What the case gives a law to start from, by internal variable.
-fn initial(simulation: &Simulation, name: &str, built: &BuiltLaw) -> Map<String, Value> {
-    let problem = simulation.problem();
-    let of_groups = problem.groups.iter().map(|group| &group.material);
-    let of_phases = problem.phases.iter().flat_map(|phase| &phase.materials);
-    let mut all = of_groups.chain(of_phases.map(|(_, material)| material));
-    let same =
-        all.find(|material| material.name == name && std::ptr::eq(material.built.as_ref(), built));
-    let variables = &built.law.formulation().internal_variables;
-    let given = same.into_iter().flat_map(|material| &material.initial);
-    given
-        .filter_map(|&(number, value)| Some((variables.get(number)?.id.clone(), json!(value))))
-        .collect()
-}
-
-fn law(built: &BuiltLaw) -> Value {
-    let description = built.law.description();
-    let library = built.law.library();
-    let parameters: Map<String, Value> = built
-        .parameters
-        .iter()
-        .map(|p| {
-            (
-                p.id.clone(),
-                if p.value.is_nan() {
-                    Value::Null
-                } else {
-                    json!(p.value)
-                },
-            )
-        })
-        .collect();
-    let described: Vec<Value> = description
-        .parameters
-        .iter()
-        .zip(&built.parameters)
-        .map(|(declared, used)| {
-            json!({
-                "id": declared.id,
-                "symbol": declared.symbol,
-                "unit": declared.unit,
-                "value": if used.value.is_nan() { Value::Null } else { json!(used.value) },
-                "choice": declared.choices.get(used.value as usize),
-                "by_default": used.by_default,
-                "bounds": if declared.choices.is_empty() {
-                    declared.bounds.to_string()
-                } else {
-                    declared.choices.join(", ")
-                },
-                "doc": declared.doc,
-            })
-        })
-        .collect();
-    let variables: Vec<Value> = built
-        .law
-        .formulation()
-        .internal_variables
-        .iter()
-        .map(|v| json!({ "id": v.id, "symbol": v.symbol, "unit": v.unit, "doc": v.doc }))
-        .collect();
-    let mut entry = json!({
-        "law": description.id,
-        "name": description.name,
-        "doc": description.doc,
-        "references": description.references,
-        "version": description.version,
-        "library": library.path().display().to_string(),
-        "sha256": library.sha256(),
-        "parameters": parameters,
-        "described_parameters": described,
-        "internal_variables": variables,
-        "warnings": built.warnings,
-    });
-    if let Some(zone) = built.law.loaded().shear_zone() {
-        let (thickness, ratio) = (zone.thickness, zone.lateral_ratio);
-        entry["shear_zone"] = json!({ "thickness": thickness, "lateral_ratio": ratio });
-    }
-    entry
-}
-
-/// Where two halves of a step after a cut-back lead.
-fn in_halves(neighbour: Option<Neighbour>) -> Value {
-    match neighbour {
-        Some(Neighbour::Apart {
-            displacements,
-            forces,
-        }) => json!({ "displacements": displacements, "forces": forces }),
-        Some(Neighbour::None) => json!("no equilibrium"),
-        None => Value::Null,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn inaccurate_results_are_one_warning_a_phase() {
-        let mut summary = Summary {
-            head: Map::new(),
-            probe_names: Vec::new(),
-            estimates_mesh: false,
-            course: Course::default(),
-        };
-        for (phase, increment, warning) in [
-            ("a", 1, None),
-            ("a", 2, Some("slow")),
-            ("a", 3, Some("slower")),
-            ("b", 1, None),
-            ("c", 4, Some("odd")),
-        ] {
-            let place = Place {
-                phase: phase.to_owned(),
-                increment,
-            };
-            let increment = Increment {
-                place,
-                unreliable: warning.map(str::to_owned),
-                ..Increment::default()
-            };
-            summary.last_increment(&increment, Vec::new());
-        }
-        for (phase, unreliable) in [("a", 3), ("b", 0), ("c", 1)] {
-            summary.phase(PhaseRecord {
-                unreliable,
-                ..PhaseRecord::new(phase, 0, 0.0)
-            });
-        }
-        let what = "with results that a law calls inaccurate; first in increment";
-        assert_eq!(
-            summary.unreliable(),
-            [
-                format!("phase `a`: 3 steps {what} 2: slow"),
-                format!("phase `c`: 1 step {what} 4: odd"),
-            ]
-        );
-    }
+    summary.ending = ending.clone();
+    write(folder, summary)?;
+    Ok(true)
 }

@@ -5,9 +5,11 @@
 //! `[[variant]]` overrides the file in the same way, which then stands for as many files. Settings
 //! of the command line come last: they override all of it, in every variant.
 
-use crate::read::{deserialize_or, toml_error};
+use crate::misfit::Misfit;
+use crate::read::refuse_infinite;
 use crate::setting::Setting;
-use crate::toml_errors;
+use crate::syntax::parse_table;
+use crate::value::read_root;
 use crate::{Error, Source};
 use serde::de::DeserializeOwned;
 use std::collections::HashMap;
@@ -94,7 +96,7 @@ pub fn merged<T: DeserializeOwned>(source: &Source) -> Result<Variants<T>, Error
         .collect();
     let mut merged: Option<Spanned<DeTable<'_>>> = None;
     for text in &texts {
-        let mut table = DeTable::parse(text).map_err(|error| toml_error(source, &error))?;
+        let mut table = parse_table(source, text)?;
         table.get_mut().remove("base");
         match &mut merged {
             None => merged = Some(table),
@@ -179,26 +181,25 @@ fn with_settings<'i, T: DeserializeOwned>(
     let own = variant.map_or(&[][..], |(_, own)| own);
     let keys = table.get_ref().keys().map(Spanned::span);
     let of_file: Vec<Range<usize>> = keys.filter(|key| !own.contains(key)).collect();
-    deserialize_or(source, table, |error| {
-        let explained = made.iter().find_map(|made| made.instead_of(error));
-        explained.or_else(|| {
-            let is_key_of_file = error.span().is_some_and(|span| of_file.contains(&span));
-            let reworded = if is_key_of_file {
-                // Those are taken out before the rest is read.
-                toml_errors::unknown_key(source, error, &["variant", "base"])
-            } else {
-                let (name, _) = variant?;
-                toml_errors::missing_key(source, error, &format!(" in variant `{name}`"))
-            };
-            reworded.map(Error::from)
-        })
+    refuse_infinite(source, table.get_ref())?;
+    read_root(table).map_err(|misfit: Misfit| {
+        if let Some(error) = made.iter().find_map(|made| made.instead_of(&misfit)) {
+            return error;
+        }
+        if misfit.span().is_some_and(|span| of_file.contains(&span)) {
+            // Those are taken out before the rest is read.
+            let more = ["variant", "base"];
+            return misfit.input_error_in(source, &more, "").into();
+        }
+        let whose = variant.map(|(name, _)| format!(" in variant `{name}`"));
+        let whose = whose.unwrap_or_default();
+        misfit.input_error_in(source, &[], &whose).into()
     })
 }
 
 /// The file after its base, that after its own, and so on.
 fn with_bases(source: Source, chain: usize) -> Result<Source, Error> {
-    let table =
-        DeTable::parse(source.text_of_files()).map_err(|error| toml_error(&source, &error))?;
+    let table = parse_table(&source, source.text_of_files())?;
     let Some((_, base)) = table
         .get_ref()
         .iter()

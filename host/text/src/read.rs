@@ -1,99 +1,50 @@
 //! Reading TOML with the place of every error.
 
-use crate::toml_errors;
+use crate::syntax::parse_table;
+use crate::value::read_root;
 use crate::{Error, Source};
 use indexmap::IndexMap;
 use serde::de::DeserializeOwned;
-use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// Reads a whole file. Unknown keys are errors if `T` says `deny_unknown_fields`.
 ///
 /// # Errors
-/// [`Error::Input`] at the place that does not fit.
+/// [`Error::Input`] at the place that does not fit, or at a number that is not finite.
 pub fn parse<T: DeserializeOwned>(source: &Source) -> Result<T, Error> {
-    let table = DeTable::parse(source.text()).map_err(|error| toml_error(source, &error))?;
+    let table = parse_table(source, source.text())?;
+    refuse_infinite(source, table.get_ref())?;
     deserialize(source, table)
 }
 
-/// Reads a table whose spans count in the text of a source.
+/// As [`parse`], of a file whose numbers need not be finite.
 ///
 /// # Errors
-/// [`Error::Input`] at the place that does not fit, or at a number that is not finite.
-pub fn deserialize<T: DeserializeOwned>(
+/// [`Error::Input`] at the place that does not fit.
+pub fn parse_any_numbers<T: DeserializeOwned>(source: &Source) -> Result<T, Error> {
+    deserialize(source, parse_table(source, source.text())?)
+}
+
+/// Reads a table whose spans count in the text of a source.
+fn deserialize<T: DeserializeOwned>(
     source: &Source,
     table: Spanned<DeTable<'_>>,
 ) -> Result<T, Error> {
-    deserialize_or(source, table, |_| None)
-}
-
-/// As [`deserialize`]; `explain` may know better what an error comes from.
-pub(crate) fn deserialize_or<T: DeserializeOwned>(
-    source: &Source,
-    table: Spanned<DeTable<'_>>,
-    explain: impl Fn(&toml::de::Error) -> Option<Error>,
-) -> Result<T, Error> {
-    for (key, value) in table.get_ref() {
-        refuse_infinite(source, key.get_ref(), value)?;
-    }
-    let again = (source.text().len() <= MOST_COPIED).then(|| table.clone());
-    T::deserialize(toml::Deserializer::from(table)).map_err(|error| {
-        let choices = || again.and_then(|table| choice_error::<T>(source, table, &error));
-        let better = explain(&error).or_else(choices);
-        better.unwrap_or_else(|| toml_error(source, &error))
-    })
-}
-
-/// Longest text, in bytes, whose contents are kept a second time for the sake of a message.
-const MOST_COPIED: usize = 1 << 20;
-
-/// The error of a value that stands where a choice is expected and is no text. The error for an
-/// unknown word lists the choices.
-fn choice_error<T: DeserializeOwned>(
-    source: &Source,
-    mut table: Spanned<DeTable<'_>>,
-    error: &toml::de::Error,
-) -> Option<Error> {
-    let span = error
-        .span()
-        .filter(|_| toml_errors::expects_choice(error))?;
-    let mut values = table.get_mut().iter_mut().map(|(_, value)| value);
-    let value = value_at(&mut values, &span)?.get_mut();
-    let found = toml_errors::value_in_words(value);
-    *value = DeValue::String("".into());
-    let refused = T::deserialize(toml::Deserializer::from(table)).err()?;
-    (refused.span()? == span).then(|| toml_errors::no_choice(source, &refused, &found).into())
-}
-
-/// The value at this place of the text.
-fn value_at<'t, 'i: 't>(
-    values: &mut dyn Iterator<Item = &'t mut Spanned<DeValue<'i>>>,
-    span: &Range<usize>,
-) -> Option<&'t mut Spanned<DeValue<'i>>> {
-    for value in values {
-        if value.span() == *span {
-            return Some(value);
-        }
-        let found = match value.get_mut() {
-            DeValue::Array(entries) => value_at(&mut entries.iter_mut(), span),
-            DeValue::Table(table) => value_at(&mut table.iter_mut().map(|(_, value)| value), span),
-            _ => None,
-        };
-        if found.is_some() {
-            return found;
-        }
-    }
-    None
-}
-
-/// An error of the TOML reader, at its place.
-pub fn toml_error(source: &Source, error: &toml::de::Error) -> Error {
-    toml_errors::reword(source, error).into()
+    read_root(table).map_err(|misfit| misfit.input_error(source).into())
 }
 
 /// TOML has `nan` and `inf`; no quantity here has such a value.
-fn refuse_infinite(source: &Source, key: &str, value: &Spanned<DeValue<'_>>) -> Result<(), Error> {
+pub(crate) fn refuse_infinite(source: &Source, table: &DeTable<'_>) -> Result<(), Error> {
+    let mut entries = table.iter();
+    entries.try_for_each(|(key, value)| refuse_infinite_in(source, key.get_ref(), value))
+}
+
+fn refuse_infinite_in(
+    source: &Source,
+    key: &str,
+    value: &Spanned<DeValue<'_>>,
+) -> Result<(), Error> {
     match value.get_ref() {
         DeValue::Float(float) => {
             let text = float.as_str();
@@ -105,13 +56,94 @@ fn refuse_infinite(source: &Source, key: &str, value: &Spanned<DeValue<'_>>) -> 
         }
         DeValue::Array(entries) => entries
             .iter()
-            .try_for_each(|entry| refuse_infinite(source, key, entry)),
-        DeValue::Table(table) => table
-            .iter()
-            .try_for_each(|(key, value)| refuse_infinite(source, key.get_ref(), value)),
+            .try_for_each(|entry| refuse_infinite_in(source, key, entry)),
+        DeValue::Table(table) => refuse_infinite(source, table),
         _ => Ok(()),
     }
 }
 
 /// Values by name, each with the place of name and value.
 pub type Named<T> = IndexMap<Spanned<String>, Spanned<T>>;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde::Deserialize;
+
+    #[derive(Debug, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    enum Choice {
+        One,
+        Two,
+    }
+
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    #[expect(dead_code, reason = "only read")]
+    struct Entry {
+        a: f64,
+    }
+
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    #[expect(dead_code, reason = "only read")]
+    struct File {
+        n: Option<usize>,
+        #[serde(alias = "r")]
+        x: Option<[f64; 2]>,
+        choice: Option<Spanned<Choice>>,
+        entry: Option<Vec<Spanned<Entry>>>,
+    }
+
+    /// The message, and the hint.
+    fn refused(text: &str) -> String {
+        let error = parse::<File>(&Source::new("file.toml", text)).unwrap_err();
+        let hint = error.help().map(|hint| format!("; {hint}"));
+        format!("{error}{}", hint.unwrap_or_default())
+    }
+
+    #[test]
+    fn what_does_not_fit_is_said_with_key_and_expectation() {
+        const COUNT: &str = "expected a whole number, not negative";
+        for (text, says) in [
+            ("n = -1", format!("`n`: found the number -1, {COUNT}")),
+            ("n = 2.5", format!("`n`: found the number 2.5, {COUNT}")),
+            ("n = true", format!("`n`: found `true`, {COUNT}")),
+            ("n = 2020-01-01", format!("`n`: found a date, {COUNT}")),
+            ("n = { a = 1 }", format!("`n`: found a table, {COUNT}")),
+            (
+                "x = [1.0]",
+                "`x`: found a list of 1, expected a list of 2".to_owned(),
+            ),
+            (
+                "x = [1.0, \"a\"]",
+                "found the text \"a\", expected a number".to_owned(),
+            ),
+            (
+                "x = [1, 2]\nr = [1, 2]",
+                "`x` is given twice; `r` is another name of `x`, and `z` of `y`".to_owned(),
+            ),
+            (
+                "choice = 3",
+                "`choice`: found the number 3, expected a text in quotes; there is: one, two"
+                    .to_owned(),
+            ),
+            (
+                "choice = \"tow\"",
+                "`choice`: there is no `tow`; did you mean `two`? There is: one, two".to_owned(),
+            ),
+            (
+                "[entry]\na = 1",
+                "`entry` is a list of tables; each is written with double brackets: [[entry]]"
+                    .to_owned(),
+            ),
+            ("[[entry]]", "missing key `a`".to_owned()),
+            (
+                "m = 1",
+                "unknown key `m`; there is: n, r, x, choice, entry".to_owned(),
+            ),
+        ] {
+            assert_eq!(refused(text), says, "{text}");
+        }
+    }
+}

@@ -4,8 +4,9 @@
 //! its `name` if it has one: `phase.2.increments=80`, `phase.loading.increments=80`.
 
 use crate::base::{merge_value, name};
-use crate::read::toml_error;
-use crate::toml_errors::value_in_words;
+use crate::misfit::{Kind, Misfit};
+use crate::syntax::syntax_error;
+use crate::value::in_words;
 use crate::{Error, InputError, Source, suggestion};
 use std::ops::Range;
 use toml::Spanned;
@@ -31,9 +32,9 @@ pub(crate) struct Made {
 
 impl Made {
     /// What to say instead of an error about what the table lacks.
-    pub(crate) fn instead_of(&self, error: &toml::de::Error) -> Option<Error> {
-        let is_here = self.range.contains(&error.span()?.start);
-        let lacks = error.message().trim().starts_with("missing field ");
+    pub(crate) fn instead_of(&self, misfit: &Misfit) -> Option<Error> {
+        let is_here = self.range.contains(&misfit.span()?.start);
+        let lacks = matches!(misfit.kind, Kind::MissingKey(_));
         (is_here && lacks).then(|| self.error.clone().into())
     }
 }
@@ -59,8 +60,11 @@ impl<'i> Setting<'i> {
                 let message = "one key and one value are expected; --set may be repeated";
                 source.error(range.clone(), message)
             })?,
-            Err(error) => bare_word(source, range.start, equals + 1..range.end)
-                .map_err(|refused| refused.unwrap_or_else(|| toml_error(source, &error)))?,
+            Err(error) => {
+                bare_word(source, range.start, equals + 1..range.end).map_err(|refused| {
+                    refused.unwrap_or_else(|| syntax_error(source, text, &error).into())
+                })?
+            }
         };
         Ok(Self { range, keys, value })
     }
@@ -142,7 +146,7 @@ impl<'i> Setting<'i> {
                     "there is no `{}`: `{}` is {}",
                     self.path(depth + 1),
                     self.path(depth),
-                    value_in_words(other)
+                    in_words(other)
                 );
                 Err(source.error(key.span(), message).into())
             }
@@ -273,9 +277,8 @@ fn keys<'i>(source: &Source, path: &str) -> Result<Vec<Spanned<DeString<'i>>>, E
             )
             .hint(format!(
                 "quotes of the shell around those of the name: --set '{quoted}=…'"
-            ))
-            .into(),
-        None => toml_error(source, &error),
+            )),
+        None => syntax_error(source, &text, &error),
     })?;
     let mut keys = Vec::new();
     let mut below = Some(table.get_ref());

@@ -1,12 +1,13 @@
 //! A text that a user wrote, and errors with their place in it.
 
 use crate::setting::{key_at, key_in_setting};
-use crate::{Error, file};
+use crate::{Error, file, suggestion};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::string::FromUtf8Error;
 use std::sync::Arc;
 use thiserror::Error;
+use toml::Spanned;
 
 /// An input file with the files it is based on, kept for messages that point into them.
 ///
@@ -215,6 +216,24 @@ impl Source {
             error.second = Some((span, label.into()));
         }
         error
+    }
+
+    /// The file of a name that a file has at a span: relative to the folder of that file.
+    pub fn file_named(&self, name: &Path, span: &Range<usize>) -> PathBuf {
+        let folder = self.path_at(span).parent();
+        folder.unwrap_or(Path::new("")).join(name)
+    }
+
+    /// An error about a name that there is not, with those that there are.
+    pub fn unknown<'a>(
+        &self,
+        kind: &str,
+        name: &Spanned<String>,
+        known: impl IntoIterator<Item = &'a str>,
+    ) -> InputError {
+        let message = format!("there is no {kind} `{}`", name.get_ref());
+        let error = self.error(name.span(), message);
+        error.hint(suggestion(name.get_ref(), known))
     }
 
     /// An error about the bytes `span`.

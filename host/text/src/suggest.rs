@@ -19,20 +19,19 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
 const FORMER: [(&str, &str); 1] = [("creep", "viscous")];
 
 /// `did you mean …?` and the whole list, for a name that is not among the candidates.
-pub fn suggestion<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str> + Clone) -> String {
-    let all: Vec<&str> = candidates.clone().into_iter().collect();
-    let list = if all.is_empty() {
-        "there is none".to_owned()
-    } else {
-        all.join(", ")
-    };
+pub fn suggestion<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> String {
+    let all: Vec<&str> = candidates.into_iter().collect();
+    if all.is_empty() {
+        return "there is none".to_owned();
+    }
+    let list = all.join(", ");
     let is_former = |(former, today): &&(&str, &str)| *former == name && all.contains(today);
     if let Some((_, today)) = FORMER.iter().find(is_former) {
         return format!("`{name}` is now called `{today}`. There is: {list}");
     }
-    match nearest(name, candidates) {
+    match nearest(name, all) {
         Some(near) => format!("did you mean `{near}`? There is: {list}"),
-        None => format!("there is: {list}").replace("there is: there is none", "there is none"),
+        None => format!("there is: {list}"),
     }
 }
 

@@ -1,8 +1,8 @@
 //! The resistance of a pile by its load–settlement curve.
 
 use super::{Loads, Pile};
+use crate::summary;
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value, json};
 
 /// Offset of Davisson's line: a length, m, and a share of the diameter.
 const OFFSET: [f64; 2] = [0.0038, 1.0 / 120.0];
@@ -208,36 +208,28 @@ impl Curve {
 
 impl Resistances {
     /// As in `summary.json`.
-    pub(crate) fn summary(&self) -> Value {
-        let mut said = Map::new();
-        let mut say = |name: &str, found: Result<f64, &String>| {
-            said.insert(name.to_owned(), json!(found.as_ref().ok()));
-            if let Err(why) = found {
-                said.insert(format!("{name}_reason"), json!(why));
-            }
+    pub(crate) fn summary(&self) -> summary::Resistances {
+        let reason = |found: &Found| found.as_ref().err().cloned();
+        let load = |found: &Found| found.as_ref().ok().copied();
+        let [head, shaft, base] = match self.ten_percent {
+            Ok(split) => split.map(Some),
+            Err(_) => [None; 3],
         };
-        let ten_percent = self.ten_percent.as_ref();
-        say(
-            "resistance_10_percent_diameter",
-            ten_percent.map(|[head, ..]| *head),
-        );
-        say("resistance_davisson", self.davisson.as_ref().copied());
-        say("resistance_chin", self.chin.as_ref().copied());
-        let split = ten_percent.ok();
-        said.insert(
-            "shaft_at_10_percent_diameter".to_owned(),
-            json!(split.map(|s| s[1])),
-        );
-        said.insert(
-            "base_at_10_percent_diameter".to_owned(),
-            json!(split.map(|s| s[2])),
-        );
-        said.insert("phase".to_owned(), json!(self.phase));
-        said.insert("start".to_owned(), json!(self.start));
-        said.insert("unit".to_owned(), json!(self.unit));
-        said.insert("diameter".to_owned(), json!(self.diameter));
-        said.insert("weight".to_owned(), json!(self.weight));
-        said.into()
+        summary::Resistances {
+            base_at_10_percent_diameter: base,
+            diameter: Some(self.diameter),
+            phase: self.phase.clone(),
+            resistance_10_percent_diameter: head,
+            resistance_10_percent_diameter_reason: self.ten_percent.as_ref().err().cloned(),
+            resistance_chin: load(&self.chin),
+            resistance_chin_reason: reason(&self.chin),
+            resistance_davisson: load(&self.davisson),
+            resistance_davisson_reason: reason(&self.davisson),
+            shaft_at_10_percent_diameter: shaft,
+            start: self.start,
+            unit: self.unit.to_owned(),
+            weight: self.weight,
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::{OF_STATION, State};
 use crate::file::Extent;
-use crate::recorder::{Cell, Table};
+use crate::table::{Cell, Table};
 use mechanics::Place;
 use std::path::Path;
 use text::Error;

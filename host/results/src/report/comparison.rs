@@ -2,7 +2,7 @@
 
 use super::number_format::display;
 use super::results::Run;
-use crate::summary_reader::{self, RunSetting, text};
+use crate::summary::{self, RunSetting};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -16,6 +16,8 @@ pub(super) struct Setting {
     /// The same, where they are numbers.
     #[serde(skip)]
     numbers: Vec<Option<f64>>,
+    #[serde(skip)]
+    is_of_law: bool,
     pub(super) differs: bool,
 }
 
@@ -27,7 +29,7 @@ impl Setting {
             name: format!("{}: {}", self.section, self.name),
             texts: numbers.is_none().then_some(&self.values),
             numbers,
-            is_first_choice: self.section.starts_with("law "),
+            is_first_choice: self.is_of_law,
         }
     }
 }
@@ -65,8 +67,8 @@ pub(super) fn subject(runs: &[Run]) -> String {
         }
         found
     };
-    let titles = distinct(|run| text(&run.summary["title"]));
-    let cases = distinct(|run| text(&run.summary["case"]));
+    let titles = distinct(|run| run.summary.head.title.as_str());
+    let cases = distinct(|run| run.summary.head.case.as_str());
     let n = runs.len();
     match (titles.as_slice(), cases.as_slice()) {
         ([title], _) if !title.is_empty() => format!("{n} runs of {title}"),
@@ -90,16 +92,19 @@ pub(super) struct FinalValue {
 
 /// Settings of all runs, in the order in which they first appear.
 pub(super) fn settings(runs: &[Run]) -> Vec<Setting> {
-    let of_runs = runs
-        .iter()
-        .map(|run| summary_reader::settings(&run.summary));
+    let of_runs = runs.iter().map(|run| summary::settings(&run.summary));
     let all: Vec<Vec<RunSetting>> = of_runs.collect();
     let mut settings: Vec<Setting> = Vec::new();
     for (number, of_run) in all.into_iter().enumerate() {
         let mut after = None;
         for of_run in of_run {
             let (value, number_of_run) = (shown(&of_run), of_run.value.as_f64());
-            let RunSetting { section, name, .. } = of_run;
+            let RunSetting {
+                section,
+                is_of_law,
+                name,
+                ..
+            } = of_run;
             let found = settings
                 .iter()
                 .position(|s| s.section == section && s.name == name);
@@ -114,6 +119,7 @@ pub(super) fn settings(runs: &[Run]) -> Vec<Setting> {
                         name,
                         values: vec![String::new(); runs.len()],
                         numbers: vec![None; runs.len()],
+                        is_of_law,
                         differs: false,
                     },
                 );

@@ -10,11 +10,11 @@ use super::pile::Pile;
 use super::profile::Profile;
 use super::results::{Ending, History, Run};
 use crate::mesh_error::OfPhase;
-use crate::summary_reader::{entries, list, text};
+use crate::summary::{Figure, Group, Head, Law, Phase, Resistances, Summary};
 use minijinja::value::Serde;
 use minijinja::{Environment, Value as Template, context};
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -62,10 +62,10 @@ struct Drawn<'a> {
     name: &'a str,
     axisymmetric: bool,
     history: &'a History,
-    figures: Value,
+    figures: Vec<Figure>,
     profile: Option<&'a Profile>,
     pile: Option<&'a Pile>,
-    resistances: &'a Value,
+    resistances: Option<&'a Resistances>,
     fields: Option<&'a Fields>,
     log: &'a Log,
     model: Option<&'a Model>,
@@ -168,44 +168,50 @@ fn common_notes(runs: &[Run]) -> Vec<String> {
 }
 
 /// The figures of every run. Points that were measured for several runs are there once.
-fn figures(runs: &[Run]) -> Vec<Value> {
-    let mut seen: Vec<(&str, &Value)> = Vec::new();
-    let mut all = Vec::new();
-    for run in runs {
-        let mut figures = run.summary["figures"].clone();
-        let own = figures.as_array_mut().into_iter().flatten();
-        for (figure, written) in own.zip(list(&run.summary["figures"])) {
-            let measured = (text(&written["name"]), &written["measured"]);
+fn figures(runs: &[Run]) -> Vec<Vec<Figure>> {
+    let mut seen = Vec::new();
+    let of_run = |run: &Run| {
+        let mut figures = run.summary.head.figures.clone();
+        for figure in &mut figures {
+            let measured = (figure.name.clone(), figure.measured.clone());
             if seen.contains(&measured) {
-                figure["measured"] = Value::Null;
+                figure.measured = None;
             } else {
                 seen.push(measured);
             }
         }
-        all.push(figures);
-    }
-    all
+        figures
+    };
+    runs.iter().map(of_run).collect()
 }
 
-fn drawn((run, figures): (&Run, Value)) -> Drawn<'_> {
+fn drawn((run, figures): (&Run, Vec<Figure>)) -> Drawn<'_> {
+    let Head {
+        analysis, solver, ..
+    } = &run.summary.head;
     Drawn {
         name: &run.name,
-        axisymmetric: text(&run.summary["analysis"]) == "axisymmetric",
+        axisymmetric: analysis == "axisymmetric",
         history: &run.history,
         figures,
         profile: run.profile.as_ref(),
         pile: run.pile.as_ref(),
-        resistances: &run.summary["pile"],
+        resistances: run.summary.pile.as_ref(),
         fields: run.fields.as_ref(),
         log: &run.log,
         model: run.model.as_ref(),
-        force_tolerance: run.summary["solver"]["force_tolerance"].as_f64(),
+        force_tolerance: solver.get("force_tolerance").and_then(Value::as_f64),
         units: run.units(),
     }
 }
 
 fn run_context(run: &Run, folder: &Path, is_running: bool) -> Template {
-    let summary = &run.summary;
+    let Summary {
+        head,
+        phases,
+        seconds: took,
+        ..
+    } = &run.summary;
     let (status, failed, reason) = match run.ending() {
         Ending::Unfinished(_) if is_running => ("running".to_owned(), false, String::new()),
         Ending::Done => ("done".to_owned(), false, String::new()),
@@ -223,12 +229,13 @@ fn run_context(run: &Run, folder: &Path, is_running: bool) -> Template {
         .filter(|(file, _)| run.folder.join(file).is_file())
         .filter_map(|(file, what)| Some((*file, *what, link(folder, &run.folder.join(file))?)))
         .collect();
+    let calls = run.summary.law_calls_by_group.iter();
     context! {
         name => run.name.as_str(),
         title => run.title(),
         status, failed, reason, last, files,
-        program => text(&summary["program"]),
-        facts => facts(summary),
+        program => head.program.as_str(),
+        facts => facts(&run.summary),
         notes => run.notes.clone(),
         report => [super::FILE, "history.csv"].iter().find_map(|file| {
             let path = run.folder.join(file);
@@ -236,53 +243,61 @@ fn run_context(run: &Run, folder: &Path, is_running: bool) -> Template {
         }),
         warnings => run.warnings(),
         ends => ends(run),
-        mesh_error => mesh_error(&summary["mesh_error"]),
+        mesh_error => run.summary.mesh_error.iter().flatten().map(OfPhase::words).collect::<Vec<_>>(),
         pictures => pictures(run),
-        resistances => resistances(&summary["pile"]),
-        groups => list(&summary["groups"]).map(group).collect::<Vec<_>>(),
-        laws => entries(&summary["laws"]).map(law).collect::<Vec<_>>(),
-        solver => named_values(&summary["solver"]),
-        phases => list(&summary["phases"]).map(phase).collect::<Vec<_>>(),
-        seconds => seconds(&summary["seconds"]["total"]),
-        seconds_output => seconds(&summary["seconds"]["output"]),
-        law_calls => named_values(&summary["law_calls_by_group"]),
+        resistances => run.summary.pile.as_ref().map(resistances).unwrap_or_default(),
+        groups => head.groups.iter().map(group).collect::<Vec<_>>(),
+        laws => head.laws.iter().map(law).collect::<Vec<_>>(),
+        solver => named_values(&head.solver),
+        phases => phases.iter().map(phase).collect::<Vec<_>>(),
+        seconds => seconds(took.total),
+        seconds_output => seconds(took.output),
+        law_calls => calls.map(|(group, n)| (words(group), display(*n as f64))).collect::<Vec<_>>(),
         cut_backs => cut_backs(&run.log),
         n_cut_backs => run.log.n_cut_backs,
-        case_files => list(&summary["case_files"])
-            .map(|file| (text(&file["path"]).to_owned(), text(&file["text"]).to_owned()))
+        case_files => head.case_files.iter()
+            .map(|file| (file.path.clone(), file.text.clone()))
             .collect::<Vec<_>>(),
     }
 }
 
 /// What the head of the page says of a run.
-fn facts(summary: &Value) -> Vec<String> {
+fn facts(summary: &Summary) -> Vec<String> {
+    let head = &summary.head;
     let mut facts = Vec::new();
-    match text(&summary["variant"]) {
-        "" => (),
-        variant => facts.push(format!("variant {variant}")),
+    facts.extend(
+        head.variant
+            .iter()
+            .map(|variant| format!("variant {variant}")),
+    );
+    if !head.analysis.is_empty() {
+        facts.push(head.analysis.replace('_', " "));
     }
-    match text(&summary["analysis"]) {
-        "" => (),
-        analysis => facts.push(analysis.replace('_', " ")),
-    }
-    facts.extend(list(&summary["set"]).map(|set| format!("set {}", text(set))));
-    let count = |value: &Value, what: &str| value.as_u64().map(|n| format!("{n} {what}"));
-    facts.extend(count(&summary["mesh"]["nodes"], "nodes"));
-    facts.extend(count(&summary["mesh"]["elements"], "elements"));
-    facts.extend(accuracy(&summary["accuracy"]));
-    facts.extend(seconds(&summary["seconds"]["total"]).map(|seconds| format!("{seconds} s")));
-    match text(&summary["program"]) {
-        "" => (),
-        program => facts.push(program.to_owned()),
+    facts.extend(head.set.iter().map(|set| format!("set {set}")));
+    facts.extend(head.mesh.nodes.map(|n| format!("{n} nodes")));
+    facts.extend(head.mesh.elements.map(|n| format!("{n} elements")));
+    facts.extend(head.accuracy.as_ref().and_then(accuracy));
+    facts.extend(seconds(summary.seconds.total).map(|seconds| format!("{seconds} s")));
+    if !head.program.is_empty() {
+        facts.push(head.program.clone());
     }
     facts
 }
 
 /// Whether an accuracy that was asked for is reached.
 fn accuracy(chosen: &Value) -> Option<String> {
-    let (asked, verdict) = (chosen["asked"].as_f64()?, text(&chosen["verdict"]));
-    let estimated = chosen["reached"].as_f64();
-    let estimated = estimated.map(|error| format!(", error {error:.1e} estimated"));
+    #[derive(Deserialize)]
+    struct Chosen {
+        asked: f64,
+        verdict: String,
+        reached: Option<f64>,
+    }
+    let Chosen {
+        asked,
+        verdict,
+        reached,
+    } = Chosen::deserialize(chosen).ok()?;
+    let estimated = reached.map(|error| format!(", error {error:.1e} estimated"));
     let estimated = estimated.unwrap_or_default();
     Some(format!("accuracy {asked} {verdict}{estimated}"))
 }
@@ -290,9 +305,8 @@ fn accuracy(chosen: &Value) -> Option<String> {
 /// Pictures in the folder that the page does not draw itself, such as figures of cuts: names and
 /// data addresses.
 fn pictures(run: &Run) -> Vec<(String, String)> {
-    let drawn: Vec<&str> = list(&run.summary["figures"])
-        .map(|figure| text(&figure["name"]))
-        .collect();
+    let drawn = run.summary.head.figures.iter();
+    let drawn: Vec<&str> = drawn.map(|figure| figure.name.as_str()).collect();
     let Ok(entries) = std::fs::read_dir(&run.folder) else {
         return Vec::new();
     };
@@ -341,122 +355,112 @@ fn ends(run: &Run) -> Template {
     context! { phases, probes }
 }
 
-/// The error of the mesh at the end of each phase, in words.
-fn mesh_error(of_phases: &Value) -> Vec<String> {
-    let of_phase = |found: &Value| OfPhase::deserialize(found).ok();
-    let found = list(of_phases).filter_map(of_phase);
-    found.map(|found| found.words()).collect()
-}
-
-/// Criteria of a pile's resistance: name, load or why none exists. Empty without a pile.
-fn resistances(pile: &Value) -> Vec<(&'static str, String)> {
+/// Criteria of a pile's resistance: name, load or why none exists.
+fn resistances(pile: &Resistances) -> Vec<(&'static str, String)> {
     let criteria = [
         (
             "at a settlement of 10 % of the diameter",
-            "resistance_10_percent_diameter",
+            pile.resistance_10_percent_diameter,
+            &pile.resistance_10_percent_diameter_reason,
         ),
-        ("of it shaft", "shaft_at_10_percent_diameter"),
-        ("of it base", "base_at_10_percent_diameter"),
-        ("by Davisson", "resistance_davisson"),
-        ("by Chin", "resistance_chin"),
+        ("of it shaft", pile.shaft_at_10_percent_diameter, &None),
+        ("of it base", pile.base_at_10_percent_diameter, &None),
+        (
+            "by Davisson",
+            pile.resistance_davisson,
+            &pile.resistance_davisson_reason,
+        ),
+        (
+            "by Chin",
+            pile.resistance_chin,
+            &pile.resistance_chin_reason,
+        ),
     ];
-    let criteria = criteria.into_iter().filter_map(|(name, key)| {
-        let unit = text(&pile["unit"]);
-        let load = pile[key].as_f64().map(|load| format!("{load:.1} {unit}"));
-        let why = text(&pile[format!("{key}_reason")]);
-        let said = load.or_else(|| (!why.is_empty()).then(|| why.to_owned()))?;
-        Some((name, said))
-    });
-    criteria.collect()
+    let said = |(name, load, why): (_, Option<f64>, &Option<String>)| {
+        let load = load.map(|load| format!("{load:.1} {}", pile.unit));
+        Some((name, load.or_else(|| why.clone())?))
+    };
+    criteria.into_iter().filter_map(said).collect()
 }
 
-fn group(group: &Value) -> Template {
-    let swaps: Vec<String> = entries(&group["laws_from_phase"])
-        .map(|(phase, law)| format!("{} from phase {phase}", text(law)))
+fn group(group: &Group) -> Template {
+    let swaps = group.laws_from_phase.iter();
+    let swaps: Vec<String> = swaps
+        .map(|(phase, law)| format!("{law} from phase {phase}"))
         .collect();
     context! {
-        name => text(&group["name"]),
-        formulation => text(&group["formulation"]).replace('_', " "),
-        elements => group["elements"].as_u64(),
-        points => match &group["points_per_element"] {
+        name => group.name.as_str(),
+        formulation => group.formulation.replace('_', " "),
+        elements => group.elements,
+        points => match &group.points_per_element {
             Value::String(several) => several.clone(),
             one => one.to_string(),
         },
-        law => text(&group["law"]),
+        law => group.law.as_str(),
         swaps => swaps.join(", "),
     }
 }
 
-fn law((name, law): (&str, &Value)) -> Template {
-    let number = |value: &Value| value.as_f64().map(display).unwrap_or_default();
-    let described = list(&law["described_parameters"]).map(|p| {
+fn law((name, law): (&String, &Law)) -> Template {
+    let number = |value: Option<f64>| value.map(display).unwrap_or_default();
+    let described = law.described_parameters.iter().map(|p| {
         context! {
-            id => text(&p["id"]),
-            symbol => text(&p["symbol"]),
-            unit => text(&p["unit"]),
-            value => p["choice"].as_str().map_or_else(|| number(&p["value"]), str::to_owned),
-            by_default => p["by_default"].as_bool(),
-            bounds => text(&p["bounds"]),
-            doc => text(&p["doc"]),
+            value => p.choice.clone().unwrap_or_else(|| number(p.value)),
+            ..Template::from(Serde(p))
         }
     });
     let mut parameters: Vec<Template> = described.collect();
     if parameters.is_empty() {
-        let plain = |(id, value)| context! { id, value => number(value) };
-        parameters = entries(&law["parameters"]).map(plain).collect();
+        let plain = |(id, value): (&String, &Option<f64>)| context! { id, value => number(*value) };
+        parameters = law.parameters.iter().map(plain).collect();
     }
-    let variables = list(&law["internal_variables"]).map(|v| {
-        context! {
-            id => text(&v["id"]),
-            symbol => text(&v["symbol"]),
-            unit => text(&v["unit"]),
-            doc => text(&v["doc"]),
-        }
-    });
     context! {
         name,
         parameters,
-        variables => variables.collect::<Vec<_>>(),
-        id => text(&law["law"]),
-        called => text(&law["name"]),
-        doc => text(&law["doc"]),
-        references => text(&law["references"]),
-        version => text(&law["version"]),
-        sha256 => text(&law["sha256"]),
+        variables => Template::from(Serde(&law.internal_variables)),
+        id => law.law.as_str(),
+        called => law.name.as_str(),
+        doc => law.doc.as_str(),
+        references => law.references.as_str(),
+        version => law.version.as_str(),
+        sha256 => law.sha256.as_str(),
     }
 }
 
+/// A name in words.
+fn words(name: &str) -> String {
+    name.replace('_', " ")
+}
+
 /// Names and values of an object.
-fn named_values(object: &Value) -> Vec<(String, String)> {
+fn named_values(object: &Map<String, Value>) -> Vec<(String, String)> {
     let value = |value: &Value| match value {
         Value::Number(number) => number.as_f64().map(display).unwrap_or_default(),
         Value::Bool(true) => "yes".to_owned(),
         Value::Bool(false) => "no".to_owned(),
-        other => text(other).to_owned(),
+        other => other.as_str().unwrap_or_default().to_owned(),
     };
-    entries(object)
-        .map(|(name, v)| (name.replace('_', " "), value(v)))
-        .collect()
+    let entries = object.iter();
+    entries.map(|(name, v)| (words(name), value(v))).collect()
 }
 
-fn phase(phase: &Value) -> Template {
-    let count = |key: &str| phase[key].as_u64();
+fn phase(phase: &Phase) -> Template {
     context! {
-        name => text(&phase["name"]),
-        equations => count("equations"),
-        increments => count("increments"),
-        iterations => count("iterations"),
-        cut_backs => count("cut_backs"),
-        unreliable => count("unreliable_steps"),
-        factorisations => count("factorisations"),
-        laws => seconds(&phase["seconds"]["laws_and_forces"]),
-        assembly => seconds(&phase["seconds"]["assembly"]),
-        solution => seconds(&phase["seconds"]["equations"]),
+        name => phase.name.as_str(),
+        equations => phase.equations,
+        increments => phase.increments,
+        iterations => phase.iterations,
+        cut_backs => phase.cut_backs,
+        unreliable => phase.unreliable_steps,
+        factorisations => phase.factorisations,
+        laws => seconds(phase.seconds.laws_and_forces),
+        assembly => seconds(phase.seconds.assembly),
+        solution => seconds(phase.seconds.equations),
     }
 }
 
-fn seconds(value: &Value) -> Option<String> {
-    value.as_f64().map(|seconds| format!("{seconds:.3}"))
+fn seconds(seconds: Option<f64>) -> Option<String> {
+    seconds.map(|seconds| format!("{seconds:.3}"))
 }
 
 fn cut_backs(log: &Log) -> Vec<Template> {

@@ -12,11 +12,9 @@ use super::table::Table;
 use crate::fields::unstructured_grid;
 use crate::output_request::OutputRequest;
 use crate::pressures::Pressure;
-use crate::summary::{About, Summary};
-use crate::summary_reader::{entries, list, text};
+use crate::summary::{self, About, DONE, Progress, RUNNING, Summary};
 use mechanics::Simulation;
 use serde::Serialize;
-use serde_json::Value;
 use std::collections::{BTreeMap, HashMap};
 use std::fs::Metadata;
 use std::path::{Path, PathBuf};
@@ -29,8 +27,8 @@ pub(super) struct Run {
     pub(super) name: String,
     /// The folder.
     pub(super) folder: PathBuf,
-    /// `summary.json`, null if absent.
-    pub(super) summary: Value,
+    /// `summary.json`, empty if absent.
+    pub(super) summary: Summary,
     pub(super) history: History,
     pub(super) profile: Option<Profile>,
     pub(super) pile: Option<Pile>,
@@ -245,9 +243,8 @@ impl Run {
         });
         let mut fields = Fields::read(folder, budget, &mut notes);
         if let Some(fields) = &mut fields {
-            let groups: Vec<String> = list(&summary["groups"])
-                .map(|group| text(&group["name"]).to_owned())
-                .collect();
+            let groups = summary.head.groups.iter();
+            let groups: Vec<String> = groups.map(|group| group.name.clone()).collect();
             fields.label(&groups, |time| history.times.label(time));
         }
         let log = Log::read(&folder.join("log.jsonl"), budget, &mut notes);
@@ -273,8 +270,11 @@ impl Run {
         simulation: &Simulation,
         warnings: &[String],
     ) -> Self {
-        let mut summary = Summary::new(about, wanted, simulation).running();
-        summary["warnings"] = warnings.into();
+        let summary = Summary {
+            head: Progress::new(about, wanted, simulation).head().clone(),
+            warnings: Some(warnings.to_vec()),
+            ..Summary::default()
+        };
         let has_pressures = simulation.problem().has_pore_pressure();
         let text = unstructured_grid(&simulation.snapshot(), has_pressures, false);
         let groups = simulation.groups().iter().map(|group| group.name.clone());
@@ -303,13 +303,13 @@ impl Run {
         if self.model.is_some() {
             return Ending::NotRun;
         }
-        if self.summary.is_null() {
+        let summary::Ending { status, error, .. } = &self.summary.ending;
+        if status.is_empty() {
             return Ending::Unfinished(
                 "there is no summary.json, so the run was stopped from outside or has not ended yet",
             );
         }
-        let status = text(&self.summary["status"]);
-        if status == "running" {
+        if status == RUNNING {
             return Ending::Unfinished("the run was stopped from outside or has not ended yet");
         }
         if !self.log.ended && !self.log.attempts.is_empty() {
@@ -318,15 +318,15 @@ impl Run {
                  summary.json may be of an earlier run",
             );
         }
-        match status {
-            "done" => Ending::Done,
-            status => Ending::Failed(status.to_owned(), text(&self.summary["error"]).to_owned()),
+        match status.as_str() {
+            DONE => Ending::Done,
+            status => Ending::Failed(status.to_owned(), error.clone().unwrap_or_default()),
         }
     }
 
     /// Its title.
     pub(super) fn title(&self) -> &str {
-        match text(&self.summary["title"]) {
+        match self.summary.head.title.as_str() {
             "" => &self.name,
             title => title,
         }
@@ -334,17 +334,18 @@ impl Run {
 
     /// Warnings of the run and of its laws, each once.
     pub(super) fn warnings(&self) -> Vec<String> {
-        let of_run = list(&self.summary["warnings"]);
-        let of_laws = entries(&self.summary["laws"]).flat_map(|(_, law)| list(&law["warnings"]));
+        let of_run = self.summary.warnings.iter().flatten();
+        let laws = self.summary.head.laws.values();
+        let of_laws = laws.flat_map(|law| &law.warnings);
         let mut warnings: Vec<String> = Vec::new();
         let mut add = |warning: &str| {
             if !warning.is_empty() && !warnings.iter().any(|w| w == warning) {
                 warnings.push(warning.to_owned());
             }
         };
-        of_run.chain(of_laws).for_each(|warning| add(text(warning)));
+        of_run.chain(of_laws).for_each(|warning| add(warning));
         // An interrupted run has not come to its summary of them.
-        if !self.summary["warnings"].is_array() {
+        if self.summary.warnings.is_none() {
             self.log.unreliable.iter().for_each(|warning| add(warning));
         }
         warnings
@@ -365,13 +366,13 @@ impl Run {
             units.insert(name, unit);
         }
         units.insert("displacement", "m");
-        for (_, law) in entries(&self.summary["laws"]) {
-            for variable in list(&law["internal_variables"]) {
-                units.insert(text(&variable["id"]), text(&variable["unit"]));
+        for law in self.summary.head.laws.values() {
+            for variable in &law.internal_variables {
+                units.insert(&variable.id, &variable.unit);
             }
         }
-        for (probe, unit) in entries(&self.summary["probe_units"]) {
-            units.insert(probe, text(unit));
+        for (probe, unit) in &self.summary.head.probe_units {
+            units.insert(probe, unit.as_deref().unwrap_or_default());
         }
         units.retain(|_, unit| !unit.is_empty());
         units
@@ -398,17 +399,18 @@ fn profile(
     })
 }
 
-fn summary(folder: &Path, notes: &mut Vec<String>) -> Value {
-    let text = match std::fs::read_to_string(folder.join("summary.json")) {
+fn summary(folder: &Path, notes: &mut Vec<String>) -> Summary {
+    let text = match std::fs::read_to_string(folder.join(summary::FILE_NAME)) {
         Ok(text) => text,
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Value::Null,
         Err(error) => {
-            notes.push(format!("summary.json: {error}"));
-            return Value::Null;
+            if error.kind() != std::io::ErrorKind::NotFound {
+                notes.push(format!("summary.json: {error}"));
+            }
+            return Summary::default();
         }
     };
     serde_json::from_str(&text).unwrap_or_else(|error| {
         notes.push(format!("summary.json: {error}"));
-        Value::Null
+        Summary::default()
     })
 }

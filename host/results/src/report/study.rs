@@ -10,9 +10,11 @@ use crate::run_table::shown;
 use crate::study::{
     Design, EFFECTS, Effect, History, Output, ParameterRecord, Record, Row, State, Take, effects,
 };
+use crate::table::comma_separated;
 use indexmap::{IndexMap, IndexSet};
 use minijinja::{Environment, Value as Template, context};
 use serde::Serialize;
+use std::iter;
 use std::path::Path;
 use text::Error;
 use text::write::replace_whole;
@@ -113,9 +115,7 @@ pub(super) fn render(folder: &Path, now: Option<u64>) -> Result<String, Error> {
     };
     let found: IndexMap<String, Vec<Effect>> =
         record.outputs.iter().zip(&numbers).map(of_output).collect();
-    let table = effects_table(&record, &found);
-    let table = table.map_err(|error| internal(error.to_string()))?;
-    replace_whole(&folder.join(EFFECTS), table)?;
+    replace_whole(&folder.join(EFFECTS), effects_table(&record, &found)?)?;
     let units = units(folder, &rows);
     let (history, left_out) = curves(&histories);
     let first = record.outputs.first();
@@ -185,12 +185,8 @@ fn units(folder: &Path, rows: &[Row]) -> IndexMap<String, String> {
 }
 
 /// `effects.csv`: what each parameter does to each output.
-fn effects_table(
-    record: &Record,
-    found: &IndexMap<String, Vec<Effect>>,
-) -> Result<Vec<u8>, Box<dyn std::error::Error + Send + Sync>> {
-    let mut table = csv::Writer::from_writer(Vec::new());
-    table.write_record([
+fn effects_table(record: &Record, found: &IndexMap<String, Vec<Effect>>) -> Result<String, Error> {
+    let header = [
         "output",
         "parameter",
         "mean_at_lowest",
@@ -201,28 +197,26 @@ fn effects_table(
         "total",
         "total_lower",
         "total_upper",
-    ])?;
-    for (output, effects) in found {
-        for effect in effects {
-            let mean = |level: Option<&crate::study::Level>| level.map(|level| level.mean);
-            let total = effect.total;
-            let intervals = [effect.interval, total.and_then(|total| total.interval)];
-            let [of_share, of_total] = intervals.map(|interval| match interval {
-                Some([low, high]) => [Some(low), Some(high)],
-                None => [None; 2],
-            });
-            let ends = [effect.levels.first(), effect.levels.last()];
-            let mut numbers: Vec<Option<f64>> = ends.into_iter().map(mean).collect();
-            numbers.push(effect.share);
-            numbers.extend(of_share);
-            numbers.push(total.map(|total| total.value));
-            numbers.extend(of_total);
-            let cells = numbers.into_iter().map(|number| shown(&number.into()));
-            let names = [output, &record.parameters[effect.parameter].name];
-            table.write_record(names.into_iter().cloned().chain(cells))?;
-        }
-    }
-    Ok(table.into_inner()?)
+    ];
+    let row = |output: &String, effect: &Effect| {
+        let ends = [effect.levels.first(), effect.levels.last()];
+        let ends = ends.map(|level| level.map(|level| level.mean));
+        let bounds =
+            |interval: Option<[f64; 2]>| interval.map_or([None; 2], |interval| interval.map(Some));
+        let total = effect.total;
+        let mut numbers = ends.to_vec();
+        numbers.push(effect.share);
+        numbers.extend(bounds(effect.interval));
+        numbers.push(total.map(|total| total.value));
+        numbers.extend(bounds(total.and_then(|total| total.interval)));
+        let parameter = record.parameters[effect.parameter].name.clone();
+        let mut cells = vec![output.clone(), parameter];
+        cells.extend(numbers.into_iter().map(|number| shown(&number.into())));
+        cells
+    };
+    let rows = found.iter();
+    let rows = rows.flat_map(|(output, effects)| effects.iter().map(move |e| row(output, e)));
+    comma_separated(iter::once(header.map(str::to_owned).to_vec()).chain(rows))
 }
 
 fn varied(number: usize, parameter: &ParameterRecord, rows: &[Row]) -> Varied {

@@ -1,7 +1,7 @@
-//! `summary.json`, the record of a run, read back: what it was run with, for whatever compares
-//! runs.
+//! What a run was run with, for whatever compares runs.
 
-use serde_json::{Map, Value};
+use crate::summary::{Group, Head, Law, Summary};
+use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 use text::{Source, base, key};
 
@@ -10,6 +10,8 @@ use text::{Source, base, key};
 pub(crate) struct RunSetting {
     /// Its subject, in words.
     pub(crate) section: String,
+    /// This is a law.
+    pub(crate) is_of_law: bool,
     /// Its name there.
     pub(crate) name: String,
     /// Its dotted path in the case file, if it can be set there.
@@ -21,52 +23,60 @@ pub(crate) struct RunSetting {
 }
 
 /// What a run was computed with, whether its file reports it or not: defaults too.
-pub(crate) fn settings(summary: &Value) -> Vec<RunSetting> {
+pub(crate) fn settings(summary: &Summary) -> Vec<RunSetting> {
+    let Head {
+        program,
+        analysis,
+        mesh,
+        groups,
+        laws,
+        solver,
+        ..
+    } = &summary.head;
     let mut settings = Settings(Vec::new());
-    settings.add("program", "version", None, &summary["program"]);
-    let analysis = &summary["analysis"];
-    settings.add("model", "analysis", Some(&["analysis"]), analysis);
-    settings.add("model", "nodes", None, &summary["mesh"]["nodes"]);
-    settings.add("model", "elements", None, &summary["mesh"]["elements"]);
-    for group in list(&summary["groups"]) {
-        let id = text(&group["name"]);
-        let section = format!("group {id}");
-        for name in ["formulation", "elements", "points_per_element", "law"] {
-            let path = ["groups", id, name];
-            let is_key = ["formulation", "law"].contains(&name);
-            let path = is_key.then_some(&path[..]);
-            settings.add(&section, &name.replace('_', " "), path, &group[name]);
-        }
-        for (phase, law) in entries(&group["laws_from_phase"]) {
-            let path = ["phase", phase, "laws", id];
-            settings.add(
-                &section,
-                &format!("law from phase {phase}"),
-                Some(&path),
-                law,
-            );
-        }
+    settings.add("program", "version", None, said(program));
+    settings.add("model", "analysis", Some(&["analysis"]), said(analysis));
+    settings.add("model", "nodes", None, json!(mesh.nodes));
+    settings.add("model", "elements", None, json!(mesh.elements));
+    for group in groups {
+        settings.group(group);
     }
-    for (name, law) in entries(&summary["laws"]) {
+    let first = settings.0.len();
+    for (name, law) in laws {
         settings.law(name, law);
     }
-    for phase in list(&summary["phases"]) {
-        let section = format!("phase {}", text(&phase["name"]));
-        settings.add(&section, "equations", None, &phase["equations"]);
-        settings.add(&section, "increments done", None, &phase["increments"]);
+    let of_laws = settings.0[first..].iter_mut();
+    of_laws.for_each(|setting| setting.is_of_law = true);
+    for phase in &summary.phases {
+        let section = format!("phase {}", phase.name);
+        settings.add(&section, "equations", None, json!(phase.equations));
+        settings.add(&section, "increments done", None, json!(phase.increments));
     }
-    for (name, value) in entries(&summary["solver"]) {
+    for (name, value) in solver {
         let path = ["solver", name];
-        settings.add("solver", &name.replace('_', " "), Some(&path), value);
+        settings.add("solver", &words(name), Some(&path), value.clone());
     }
     settings.0
+}
+
+/// A name in words.
+fn words(name: &str) -> String {
+    name.replace('_', " ")
+}
+
+/// A text, null if there is none.
+fn said(text: &str) -> Value {
+    match text {
+        "" => Value::Null,
+        text => text.into(),
+    }
 }
 
 /// Settings while they are collected.
 struct Settings(Vec<RunSetting>);
 
 impl Settings {
-    fn add(&mut self, section: &str, name: &str, path: Option<&[&str]>, value: &Value) {
+    fn add(&mut self, section: &str, name: &str, path: Option<&[&str]>, value: Value) {
         self.with_unit([section, name], path, value, "");
     }
 
@@ -74,75 +84,97 @@ impl Settings {
         &mut self,
         [section, name]: [&str; 2],
         path: Option<&[&str]>,
-        value: &Value,
+        value: Value,
         unit: &str,
     ) {
         if !value.is_null() {
             self.0.push(RunSetting {
                 section: section.to_owned(),
+                is_of_law: false,
                 name: name.to_owned(),
                 path: path.map(|keys| keys.iter().map(|k| key(k)).collect::<Vec<_>>().join(".")),
-                value: value.clone(),
+                value,
                 unit: unit.to_owned(),
             });
         }
     }
 
+    fn group(&mut self, group: &Group) {
+        let id = group.name.as_str();
+        let section = format!("group {id}");
+        let path = |name| ["groups", id, name];
+        let formulation = said(&group.formulation);
+        self.add(
+            &section,
+            "formulation",
+            Some(&path("formulation")),
+            formulation,
+        );
+        self.add(&section, "elements", None, json!(group.elements));
+        let points = group.points_per_element.clone();
+        self.add(&section, "points per element", None, points);
+        self.add(&section, "law", Some(&path("law")), said(&group.law));
+        for (phase, law) in &group.laws_from_phase {
+            let path = ["phase", phase, "laws", id];
+            let name = format!("law from phase {phase}");
+            self.add(&section, &name, Some(&path), json!(law));
+        }
+    }
+
     /// Those of a law. The record calls it by its name in the file and its hypothesis.
-    fn law(&mut self, name: &str, law: &Value) {
+    fn law(&mut self, name: &str, law: &Law) {
         let section = format!("law {name}");
         let id = name.rsplit_once(" (").map_or(name, |(id, _)| id);
-        self.add(&section, "law", Some(&["laws", id, "law"]), &law["law"]);
-        self.add(&section, "version", None, &law["version"]);
-        for (parameter, value) in entries(&law["parameters"]) {
-            let mut described = list(&law["described_parameters"]);
-            let described = described.find(|p| text(&p["id"]) == parameter);
-            let unit = described.map_or("", |p| text(&p["unit"]));
-            let choice = described.map(|p| &p["choice"]).filter(|c| c.is_string());
-            let (value, unit) = choice.map_or((value, unit), |choice| (choice, ""));
+        self.add(&section, "law", Some(&["laws", id, "law"]), said(&law.law));
+        self.add(&section, "version", None, said(&law.version));
+        for (parameter, value) in &law.parameters {
+            let mut described = law.described_parameters.iter();
+            let described = described.find(|p| p.id == *parameter);
+            let choice = described.and_then(|p| p.choice.as_ref());
+            let (value, unit) = match (choice, described) {
+                (Some(choice), _) => (json!(choice), ""),
+                (None, Some(described)) => (json!(value), described.unit.as_str()),
+                (None, None) => (json!(value), ""),
+            };
             let path = ["laws", id, "parameters", parameter];
             self.with_unit([&section, parameter], Some(&path), value, unit);
         }
-        for (name, value) in entries(&law["shear_zone"]) {
-            let unit = if name == "thickness" { "m" } else { "" };
-            let path = ["laws", id, name];
-            self.with_unit(
-                [&section, &name.replace('_', " ")],
-                Some(&path),
-                value,
-                unit,
-            );
+        if let Some(zone) = &law.shear_zone {
+            let (ratio, thickness) = (json!(zone.lateral_ratio), json!(zone.thickness));
+            let path = ["laws", id, "lateral_ratio"];
+            self.add(&section, "lateral ratio", Some(&path), ratio);
+            let path = ["laws", id, "thickness"];
+            self.with_unit([&section, "thickness"], Some(&path), thickness, "m");
         }
-        for (variable, value) in entries(&law["initial"]) {
+        for (variable, value) in &law.initial {
             let path = ["laws", id, "initial", variable];
-            self.add(&section, &format!("initial {variable}"), Some(&path), value);
+            let name = format!("initial {variable}");
+            self.add(&section, &name, Some(&path), json!(value));
         }
-        let digest = text(&law["sha256"]);
-        let short = Value::from(digest.get(..12).unwrap_or(digest));
+        let digest = law.sha256.as_str();
+        let short = json!(digest.get(..12).unwrap_or(digest));
         let path = ["laws", id, "sha256"];
-        self.add(&section, "library, SHA-256", Some(&path), &short);
+        self.add(&section, "library, SHA-256", Some(&path), short);
     }
 }
 
 /// Content of the files of a run, with its variant and the settings of its command line, by dotted
 /// path; nothing, where the record does not have them.
-pub(crate) fn settings_of_files(summary: &Value) -> Vec<(String, Value)> {
+pub(crate) fn settings_of_files(head: &Head) -> Vec<(String, Value)> {
     let mut source: Option<Source> = None;
-    for file in list(&summary["case_files"]) {
-        let own = Source::new(text(&file["path"]), text(&file["text"]));
+    for file in &head.case_files {
+        let own = Source::new(file.path.as_str(), file.text.as_str());
         source = Some(match source {
             None => own,
             Some(base) => own.based_on(&base),
         });
     }
-    let settings: Vec<String> = list(&summary["set"]).map(|s| text(s).to_owned()).collect();
-    let Some(source) = source.map(|source| source.with_settings(&settings)) else {
+    let Some(source) = source.map(|source| source.with_settings(&head.set)) else {
         return Vec::new();
     };
-    let variant = summary["variant"].as_str();
     let files = base::merged::<Map<String, Value>>(&source).unwrap_or_default();
     let mut files = files.into_iter();
-    let Some((_, file)) = files.find(|(name, _)| name.as_deref() == variant) else {
+    let Some((_, file)) = files.find(|(name, _)| *name == head.variant) else {
         return Vec::new();
     };
     let mut found = Vec::new();
@@ -165,9 +197,9 @@ fn flatten(path: String, value: Value, found: &mut Vec<(String, Value)>) {
         }
         Value::Array(entries) if entries.iter().any(Value::is_object) => {
             for (number, entry) in (1..).zip(entries) {
-                let name = match text(&entry["name"]) {
-                    "" => number.to_string(),
-                    name => key(name),
+                let name = match entry["name"].as_str() {
+                    None | Some("") => number.to_string(),
+                    Some(name) => key(name),
                 };
                 flatten(format!("{path}.{name}"), entry, found);
             }
@@ -200,26 +232,9 @@ pub(crate) fn names(folders: &[PathBuf]) -> Vec<String> {
     names
 }
 
-/// A text, empty if absent.
-pub(crate) fn text(value: &Value) -> &str {
-    value.as_str().unwrap_or_default()
-}
-
-/// Entries of an array, none if it is no array.
-pub(crate) fn list(value: &Value) -> impl Iterator<Item = &Value> {
-    value.as_array().into_iter().flatten()
-}
-
-/// Entries of an object, none if it is no object.
-pub(crate) fn entries(value: &Value) -> impl Iterator<Item = (&str, &Value)> {
-    let entries = value.as_object().into_iter().flatten();
-    entries.map(|(key, value)| (key.as_str(), value))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::json;
 
     #[test]
     fn settings_of_files_have_dotted_paths() {
@@ -230,7 +245,7 @@ mod tests {
         let case = "base = \"base.toml\"\n[[variant]]\nname = \"v\"\n\
                     phase = [{ name = \"load\", increments = 4 }]\n\
                     [[variant]]\nname = \"w\"\n";
-        let summary = json!({
+        let head = json!({
             "case_files": [
                 { "path": "base.toml", "text": base },
                 { "path": "case.toml", "text": case },
@@ -247,12 +262,13 @@ mod tests {
             ("laws.\"my law\".parameters.c", json!(1)),
         ];
         let expected = expected.map(|(path, value)| (path.to_owned(), value));
-        let mut found = settings_of_files(&summary);
+        let head: Head = serde_json::from_value(head).unwrap();
+        let mut found = settings_of_files(&head);
         let mut expected = expected.to_vec();
         found.sort_by(|a, b| a.0.cmp(&b.0));
         expected.sort_by(|a, b| a.0.cmp(&b.0));
         assert_eq!(found, expected);
-        assert_eq!(settings_of_files(&json!({})), []);
+        assert_eq!(settings_of_files(&Head::default()), []);
     }
 
     #[test]
