@@ -1,34 +1,30 @@
-//! From a case file to a problem in memory and the results that are wanted of it; and back: which place
-//! of the file an error of the problem is about.
+//! From a case file to a problem in memory and the results that are wanted of it.
 
+mod law_shelf;
+mod places;
 mod unused_laws;
 
+use self::law_shelf::LawShelf;
 use self::unused_laws::Look;
-use crate::case::{Case, CaseFile, GroupInput, LawInput, PhaseInput};
-use crate::ground::{LevelInput, ProfileInput, level};
-use crate::material::{
-    LawTables, ParameterValue, ZONE, is_solid_at_interface, place_failure, try_law,
-};
+use crate::case::{Case, CaseFile, GroupInput, PhaseInput};
+use crate::ground::{LevelInput, level};
+use crate::material::LawTables;
 use crate::mesh::{self, Built, MeshFile};
+use crate::spanned::Given;
 use crate::{Error, figures, ineffective_options, pile, probes};
-use abi::Hypothesis;
-use abi::status::Outcome;
 use indexmap::IndexMap;
-use law::{BuildCause, BuiltLaw, LoadedLaw, Pins, SearchPath, hexadecimal_sha256};
-use mechanics::group::PointFailure;
+use law::{BuiltLaw, Pins, SearchPath, hexadecimal_sha256};
+use mechanics::Simulation;
+use mechanics::check::{Cause, Item};
 use mechanics::mesh::{Line, Mesh};
-use mechanics::problem::Profile;
 use mechanics::problem::{
-    Axis, Cause, Displacement, ElementGroup, Force, Formulation, Free, Item, Key, Material, Phase,
-    Pressure, Problem, Refusal, Support,
+    Axis, Displacement, ElementGroup, Force, Free, Phase, Pressure, Problem, Support,
 };
 use mechanics::settings::Control;
 use mechanics::simulation::Warning;
-use mechanics::{Simulation, model};
 use results::{About, OutputRequest};
-use std::ops::Range;
 use std::sync::Arc;
-use text::{Source, suggestion};
+use text::Source;
 use toml::Spanned;
 
 /// Water stands above the ground where it is higher by this part of the ground's height.
@@ -60,10 +56,8 @@ pub(crate) fn line<'m>(
     name: &Spanned<String>,
 ) -> Result<&'m Line, Error> {
     mesh.lines.get(name.get_ref()).ok_or_else(|| {
-        let names: Vec<&str> = mesh.lines.keys().map(String::as_str).collect();
-        let message = format!("there is no line `{}`", name.get_ref());
-        let error = source.error(name.span(), message);
-        error.hint(suggestion(name.get_ref(), names)).into()
+        let names = mesh.lines.keys().map(String::as_str);
+        source.unknown("line", name, names).into()
     })
 }
 
@@ -128,28 +122,19 @@ impl Case {
                 name: name.get_ref().clone(),
                 formulation: input.formulation,
                 material,
-                integration: input.integration.as_ref().map(|i| *i.get_ref()),
-                normal: input.normal.as_ref().map(|n| (*n.get_ref()).into()),
-                in_plane: input.in_plane.as_ref().map(|i| *i.get_ref()),
+                integration: input.integration.value(),
+                normal: input.normal.value().map(Into::into),
+                in_plane: input.in_plane.value(),
                 initial_stress: match &input.initial_stress {
                     Some(stress) => Some(stress.get_ref().read(source, stress.span())?),
                     None => None,
                 },
-                unit_weight: input
-                    .unit_weight
-                    .as_ref()
-                    .map_or(0.0, |weight| *weight.get_ref()),
-                saturated_unit_weight: input.saturated_unit_weight.as_ref().map(|w| *w.get_ref()),
+                unit_weight: input.unit_weight.value().unwrap_or(0.0),
+                saturated_unit_weight: input.saturated_unit_weight.value(),
                 pore_water: input.pore_water.unwrap_or(true),
                 is_active: input.active.unwrap_or(true),
-                drainage: input
-                    .drainage
-                    .as_ref()
-                    .map_or_else(Default::default, |d| *d.get_ref()),
-                undrained_poisson_ratio: input
-                    .undrained_poisson_ratio
-                    .as_ref()
-                    .map_or(0.495, |ratio| *ratio.get_ref()),
+                drainage: input.drainage.value().unwrap_or_default(),
+                undrained_poisson_ratio: input.undrained_poisson_ratio.value().unwrap_or(0.495),
             });
         }
         let spare = shelf.spare(look, self.stands_alone())?;
@@ -278,18 +263,11 @@ impl Case {
     /// Phases that say no time while a law that depends on it is called.
     fn timeless_phases(&self, problem: &Problem) -> Vec<String> {
         let groups = &problem.groups;
-        let mut active: Vec<bool> = groups.iter().map(|group| group.is_active).collect();
+        let mut active = problem.active_after(0);
         let mut materials: Vec<_> = groups.iter().map(|group| &group.material).collect();
         let mut warnings = Vec::new();
         for (phase, written) in problem.phases.iter().zip(&self.file.phases) {
-            phase
-                .activate
-                .iter()
-                .for_each(|&group| active[group] = true);
-            phase
-                .deactivate
-                .iter()
-                .for_each(|&group| active[group] = false);
+            phase.switch(&mut active);
             for (group, material) in &phase.materials {
                 materials[*group] = material;
             }
@@ -344,159 +322,6 @@ impl Case {
         }
         warnings
     }
-
-    /// An error of the case's problem or simulation, at its place in the file where it has one.
-    pub fn place(&self, error: mechanics::Error) -> Error {
-        match error {
-            mechanics::Error::Refused(refusal) => self.place_refusal(&refusal),
-            mechanics::Error::CannotStart(failure) => self.cannot_start(failure),
-            other => other.into(),
-        }
-    }
-
-    fn place_refusal(&self, refusal: &Refusal) -> Error {
-        let error = self.source.error(
-            self.span(&refusal.item, &refusal.cause),
-            refusal.to_string(),
-        );
-        let hint = match &refusal.cause {
-            Cause::NoLine { name, known } => {
-                let known = known.iter().map(String::as_str).collect::<Vec<_>>();
-                Some(suggestion(name, known))
-            }
-            cause => cause.hint(),
-        };
-        match hint {
-            Some(hint) => error.hint(hint).into(),
-            None => error.into(),
-        }
-    }
-
-    /// Place of a part of the problem in the file.
-    fn span(&self, item: &Item, cause: &Cause) -> Range<usize> {
-        let file = &self.file;
-        let group = |number: usize| file.groups.get_index(number);
-        let phase = |number: &usize| file.phases.get(*number);
-        let found = match item {
-            Item::Problem => None,
-            Item::Group(number) => group(*number).map(|(name, _)| name.span()),
-            Item::GroupKey(number, key) => group(*number).and_then(|(name, group)| {
-                let group = group.get_ref();
-                let span = match key {
-                    Key::Integration => group.integration.as_ref().map(Spanned::span),
-                    Key::Normal => group.normal.as_ref().map(Spanned::span),
-                    Key::InPlane => group.in_plane.as_ref().map(Spanned::span),
-                    Key::InitialStress => {
-                        let path = format!("groups.{}.initial_stress", name.get_ref());
-                        let setting = self.source.setting_of(&path);
-                        setting.or_else(|| group.initial_stress.as_ref().map(Spanned::span))
-                    }
-                    Key::UnitWeight => group.unit_weight.as_ref().map(Spanned::span),
-                    Key::Drainage => group.drainage.as_ref().map(Spanned::span),
-                    Key::UndrainedPoissonRatio => {
-                        group.undrained_poisson_ratio.as_ref().map(Spanned::span)
-                    }
-                };
-                span.or_else(|| Some(name.span()))
-            }),
-            Item::LawOf { group: of, phase } => group(*of).map(|(name, group)| {
-                let swap = || {
-                    let laws = &file.phases.get((*phase)?)?.laws;
-                    laws.iter().find(|(key, _)| *key == name)
-                };
-                let own = || group.get_ref().law.span();
-                swap().map_or_else(own, |(_, law)| law.span())
-            }),
-            Item::Material(name) => {
-                let mut laws = file.laws.keys();
-                laws.find(|key| key.get_ref() == name).map(Spanned::span)
-            }
-            Item::Support(number) => file.supports.get(*number).map(|s| s.line.span()),
-            Item::Phase(number) => file.phases.get(*number).map(|phase| match cause {
-                Cause::Increments(_) => phase.increments.span(),
-                _ => phase.name.span(),
-            }),
-            Item::Displacement(phase, number) => file.phases.get(*phase).and_then(|phase| {
-                let input = phase.displacement.get(*number)?;
-                Some(input.line.span())
-            }),
-            Item::Free(phase, number) => file.phases.get(*phase).and_then(|phase| {
-                let input = phase.free.get(*number)?;
-                Some(input.line.span())
-            }),
-            Item::Pressure(phase, number) => file.phases.get(*phase).and_then(|phase| {
-                let input = phase.pressure.get(*number)?;
-                Some(input.line.span())
-            }),
-            Item::Force(phase, number) => file.phases.get(*phase).and_then(|phase| {
-                let input = phase.force.get(*number)?;
-                Some(input.line.span())
-            }),
-            Item::Rigid(phase, number) => file
-                .phases
-                .get(*phase)
-                .and_then(|phase| Some(phase.rigid.get(*number)?.span())),
-            Item::Time(number) => phase(number).and_then(|of| Some(of.time.as_ref()?.span())),
-            Item::Course(number) => phase(number).and_then(|of| Some(of.course.as_ref()?.span())),
-            Item::Activation {
-                phase,
-                group: of,
-                is_activated,
-            } => file.phases.get(*phase).and_then(|phase| {
-                let names = if *is_activated {
-                    &phase.activate
-                } else {
-                    &phase.deactivate
-                };
-                let (name, _) = group(*of)?;
-                let mut same = names
-                    .iter()
-                    .filter(|other| other.get_ref() == name.get_ref());
-                same.next_back().map(Spanned::span)
-            }),
-            Item::UnitWeight(phase, number) => file.phases.get(*phase).and_then(|phase| {
-                let (_, weight) = phase.unit_weight.get_index(*number)?;
-                Some(weight.span())
-            }),
-            Item::DrainageOf(phase, number) => file.phases.get(*phase).and_then(|phase| {
-                let (_, drainage) = phase.drainage.get_index(*number)?;
-                Some(drainage.span())
-            }),
-            Item::Water(None) => file
-                .water
-                .as_ref()
-                .map(|water| water.get_ref().level.span()),
-            Item::Water(Some(phase)) => file
-                .phases
-                .get(*phase)
-                .and_then(|phase| Some(phase.water.as_ref()?.get_ref().level.span())),
-        };
-        found.unwrap_or(0..0)
-    }
-
-    /// The error of a law that cannot start from the stress it finds: at the law's place in the
-    /// file, if that is what the law says.
-    fn cannot_start(&self, failure: Box<PointFailure>) -> Error {
-        let mut laws = self.file.laws.iter();
-        let entry = laws.find(|(key, _)| key.get_ref() == &failure.law);
-        let (outcome, group) = (failure.failure.outcome, failure.group.clone());
-        let error = mechanics::Error::CannotStart(failure);
-        match entry {
-            Some((name, law)) if matches!(outcome, Outcome::Domain | Outcome::Parameter) => {
-                let law = law.get_ref();
-                // What the file gives to start from is what the law can refuse first.
-                let given = law.initial.values().next().map(Spanned::span);
-                let paths = [
-                    format!("laws.{}.initial", name.get_ref()),
-                    format!("groups.{group}.initial_stress"),
-                ];
-                let setting = paths.iter().find_map(|path| self.source.setting_of(path));
-                let span = setting.or(given).unwrap_or_else(|| law.law.span());
-                self.source.error(span, error.to_string()).into()
-            }
-            _ => error.into(),
-        }
-    }
 }
 
 /// Refuses the error of the mesh as a part of nothing.
@@ -521,11 +346,7 @@ fn refuse_unknown_groups(source: &Source, file: &CaseFile) -> Result<(), Error> 
     });
     for group in named {
         if !names().any(|name| name == group.get_ref()) {
-            let message = format!("there is no group `{}`", group.get_ref());
-            return Err(source
-                .error(group.span(), message)
-                .hint(suggestion(group.get_ref(), names().collect::<Vec<_>>()))
-                .into());
+            return Err(source.unknown("group", group, names()).into());
         }
     }
     Ok(())
@@ -583,8 +404,7 @@ fn water_levels(
         note(&water.get_ref().level, &active)?;
     }
     for (input, phase) in file.phases.iter().zip(phases) {
-        phase.activate.iter().for_each(|&of| active[of] = true);
-        phase.deactivate.iter().for_each(|&of| active[of] = false);
+        phase.switch(&mut active);
         if let Some(water) = &input.water {
             note(&water.get_ref().level, &active)?;
         }
@@ -631,7 +451,7 @@ fn phase(source: &Source, file: &CaseFile, input: &PhaseInput) -> Result<Phase, 
     Ok(Phase {
         name: input.name.get_ref().clone(),
         increments: *input.increments.get_ref(),
-        time: input.time.as_ref().map(|time| *time.get_ref()),
+        time: input.time.value(),
         materials: Vec::new(),
         activate: numbers(&input.activate),
         deactivate: numbers(&input.deactivate),
@@ -664,169 +484,4 @@ fn phase(source: &Source, file: &CaseFile, input: &PhaseInput) -> Result<Phase, 
         free: free.collect(),
         pressure: pressure.collect::<Result<_, Error>>()?,
     })
-}
-
-/// Laws built so far; each once for every hypothesis.
-struct LawShelf<'a> {
-    source: &'a Source,
-    file: &'a CaseFile,
-    search: SearchPath,
-    laws: Laws,
-}
-
-impl<'a> LawShelf<'a> {
-    /// What the file says under a law's name.
-    fn entry(&self, name: &Spanned<String>) -> Result<&'a LawInput, Error> {
-        let laws = &self.file.laws;
-        let entry = laws.iter().find(|(key, _)| key.get_ref() == name.get_ref());
-        entry.map(|(_, entry)| entry.get_ref()).ok_or_else(|| {
-            let names: Vec<&str> = laws.keys().map(|k| k.get_ref().as_str()).collect();
-            let message = format!("there is no law `{}` under [laws]", name.get_ref());
-            self.source
-                .error(name.span(), message)
-                .hint(suggestion(name.get_ref(), names))
-                .into()
-        })
-    }
-
-    /// The law without its parameters.
-    fn loaded(&self, entry: &LawInput) -> Result<LoadedLaw, Error> {
-        self.tables().loaded(&self.search, entry)
-    }
-
-    fn tables(&self) -> LawTables<'a> {
-        LawTables {
-            source: self.source,
-            tables: &self.file.laws,
-        }
-    }
-
-    /// The law of this name, for a group.
-    fn material(
-        &mut self,
-        group_name: &Spanned<String>,
-        group: &GroupInput,
-        name: &Spanned<String>,
-    ) -> Result<Material, Error> {
-        let entry = self.entry(name)?;
-        let is_interface_law = group.formulation == Formulation::ThinLayer
-            && self.loaded(entry).is_ok_and(|law| {
-                let offered = law.description().formulation(Hypothesis::Interface2d);
-                offered.is_some()
-            });
-        let hypothesis = model::hypothesis(self.file.analysis, group.formulation, is_interface_law);
-        let key = (name.get_ref().clone(), hypothesis.name());
-        let built = if let Some(built) = self.laws.get(&key) {
-            Arc::clone(built)
-        } else {
-            let parameters = &self.tables().parameters(entry);
-            let loaded = self.loaded(entry)?;
-            let built = try_law(&loaded, hypothesis, parameters).map_err(|failure| {
-                let error = place_failure(self.source, &entry.law, parameters, &failure);
-                if !matches!(failure.cause, BuildCause::Hypothesis { .. }) {
-                    error
-                } else if let Some(adapter) =
-                    entry.adapter.as_ref().filter(|_| entry.is_shear_zone())
-                {
-                    let message = format!(
-                        "law `{}` is a shear zone, made for interface_2d, expected {}",
-                        name.get_ref(),
-                        hypothesis.name()
-                    );
-                    let error = self.source.error(adapter.span(), message);
-                    self.explain(error.into(), group_name, group, name)
-                } else {
-                    let error = self.explain(error, group_name, group, name);
-                    if is_solid_at_interface(&failure) {
-                        error.with_hint(ZONE)
-                    } else {
-                        error
-                    }
-                }
-            })?;
-            let built = Arc::new(built);
-            self.laws.insert(key, Arc::clone(&built));
-            built
-        };
-        let mut material = Material::new(name.get_ref(), built);
-        material.varying = self.varying(entry, hypothesis)?;
-        for (variable, value) in &self.tables().initial(entry) {
-            if !value.get_ref().is_finite() {
-                let message = "expected a finite number";
-                return Err(self.source.error(value.span(), message).into());
-            }
-            let law = Arc::clone(&material.built);
-            let id = variable.get_ref();
-            material = material
-                .starting_with(id, *value.get_ref())
-                .ok_or_else(|| {
-                    let variables = &law.law.formulation().internal_variables;
-                    let ids = variables.iter().map(|v| v.id.as_str()).collect();
-                    self.no_variable(&law.law.description().id, variable, ids)
-                })?;
-        }
-        Ok(material)
-    }
-
-    fn no_variable(&self, law: &str, variable: &Spanned<String>, ids: Vec<&str>) -> Error {
-        let id = variable.get_ref();
-        let message = format!("law `{law}` has no internal variable `{id}`");
-        let error = self.source.error(variable.span(), message);
-        error.hint(suggestion(id, ids)).into()
-    }
-
-    /// Parameters of a law that vary with the height; every value is held against its bounds.
-    fn varying(
-        &self,
-        entry: &LawInput,
-        hypothesis: Hypothesis,
-    ) -> Result<Vec<(String, Profile)>, Error> {
-        let given = self.tables().parameters(entry);
-        let mut varying = Vec::new();
-        for (id, value) in &given {
-            if let ParameterValue::Varying(over) = value.get_ref() {
-                let profile = ProfileInput::Over(over.clone()).read(self.source, value.span())?;
-                varying.push((id.get_ref().clone(), profile));
-            }
-        }
-        let most = varying
-            .iter()
-            .map(|(_, profile)| profile.points().len())
-            .max();
-        for point in 1..most.unwrap_or(0) {
-            let mut parameters = given.clone();
-            for value in parameters.values_mut() {
-                if let ParameterValue::Varying(over) = value.get_mut() {
-                    let last = over.z.len() - 1;
-                    over.z = vec![over.z[point.min(last)]];
-                }
-            }
-            let loaded = self.loaded(entry)?;
-            try_law(&loaded, hypothesis, &parameters)
-                .map_err(|failure| place_failure(self.source, &entry.law, &given, &failure))?;
-        }
-        Ok(varying)
-    }
-
-    /// Adds what the group expects to an error about the law's hypothesis.
-    fn explain(
-        &self,
-        error: Error,
-        name: &Spanned<String>,
-        group: &GroupInput,
-        law: &Spanned<String>,
-    ) -> Error {
-        let Error::Text(text::Error::Input(input)) = error else {
-            return error;
-        };
-        let label = format!("taken by group `{}`", name.get_ref());
-        let input = self.source.mark(*input, law.span(), label);
-        let hint = format!(
-            "group `{}` has the formulation `{}` in the analysis `{}`",
-            name.get_ref(),
-            group.formulation.name(),
-            self.file.analysis.name()
-        );
-        input.hint(hint).into()
-    }
 }

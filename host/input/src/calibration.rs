@@ -305,10 +305,7 @@ impl Calibration {
 
     /// Place of a file that a key names.
     pub fn path_of(&self, written: &Spanned<PathBuf>) -> PathBuf {
-        let file = self.source.path_at(&written.span());
-        file.parent()
-            .unwrap_or(Path::new(""))
-            .join(written.get_ref())
+        self.source.file_named(written.get_ref(), &written.span())
     }
 
     /// The points of a curve.
@@ -463,9 +460,7 @@ impl Calibration {
             .map(|test| test.name.get_ref().as_str())
             .collect();
         let unknown = |kind: &str, name: &Spanned<String>, known: &[&str]| {
-            let message = format!("there is no {kind} `{}`", name.get_ref());
-            let hint = text::suggestion(name.get_ref(), known.to_vec());
-            Error::from(self.source.error(name.span(), message).hint(hint))
+            Error::from(self.source.unknown(kind, name, known.iter().copied()))
         };
         for stage in &file.stage {
             if stage.free.is_empty() {

@@ -1,147 +1,29 @@
 //! The case file: what a user writes, key by key. Reading it gives these types; references
 //! between them (a group's law, a load's line) are resolved by the modules that use them.
 
+mod one_or_several;
+mod read;
+
+pub use one_or_several::{GroupNames, MeasuredTables};
+pub use read::Case;
+
 use crate::accuracy_settings::AccuracySettings;
 use crate::ground::{ProfileInput, StressInput, WaterChange, WaterInput};
-use crate::material::{ForeignKeys, ParameterTable, ParameterValue, Route, shear_zone};
+use crate::material::{ParameterTable, ParameterValue, Route, foreign, shear_zone};
+use crate::spanned::Given;
 use crate::{Error, schema};
-use law::Opener;
 use law::ShearZone;
-use law::adapter::{Externals, Foreign, Order, Scratch};
+use law::foreign::{Externals, Foreign, Order, Scratch};
 use mechanics::Settings;
 use mechanics::problem::{self, Analysis, Drainage, Formulation, InPlane, Integration};
 use results::output_request::{Output, Reduce};
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, de};
-use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
-use text::{Named, Source, base};
+use text::{Named, Source};
 use toml::Spanned;
-
-/// What a driver file looks like among case files.
-const DRIVER: base::OtherKind = base::OtherKind {
-    keys: &["hypothesis", "segment"],
-    message: "this is a driver file, which leads a law at one point; expected a case file",
-    command: "pilum point",
-};
-
-/// A case file and its text.
-#[derive(Clone, Debug)]
-pub struct Case {
-    /// Text and path, for messages.
-    pub source: Source,
-    /// Contents.
-    pub file: CaseFile,
-    /// Name of the variant, if the file stands for several cases.
-    pub variant: Option<String>,
-    /// Settings for opening the libraries of its laws.
-    pub opener: Opener,
-}
-
-impl Case {
-    /// Reads a case file, or `case.toml` in a folder: one case, or one for each `[[variant]]`.
-    ///
-    /// # Errors
-    /// [`text::Error::Unreadable`], or [`text::Error::Input`] at the place that does not fit.
-    pub fn load(path: &Path) -> Result<Vec<Self>, Error> {
-        Self::load_with(path, &[])
-    }
-
-    /// As [`Case::load`], with settings over what the file says, `KEY=VALUE`, in every variant.
-    ///
-    /// # Errors
-    /// As [`Case::load`]; [`text::Error::Input`] at the place in a setting.
-    pub fn load_with(path: &Path, settings: &[String]) -> Result<Vec<Self>, Error> {
-        let path = if path.is_dir() {
-            path.join("case.toml")
-        } else {
-            path.to_owned()
-        };
-        Self::of(Source::read(&path)?.with_settings(settings))
-    }
-
-    /// Takes the text of a case file.
-    ///
-    /// # Errors
-    /// [`text::Error::Input`] at the place that does not fit.
-    pub fn of(source: Source) -> Result<Vec<Self>, Error> {
-        let opener = Opener::default();
-        let (source, files) = base::read_kind(source, &DRIVER)?;
-        let case = |(variant, file)| Self {
-            source: source.clone(),
-            file,
-            variant,
-            opener: opener.clone(),
-        };
-        Ok(files.into_iter().map(case).collect())
-    }
-
-    /// The case, its laws' libraries opened with this; by default with what neither probes nor
-    /// isolates.
-    #[must_use]
-    pub fn opened_by(self, opener: &Opener) -> Self {
-        Self {
-            opener: opener.clone(),
-            ..self
-        }
-    }
-
-    /// Folder for the results if none is given: `results/<case>`, or `results/<case>/<variant>`.
-    pub fn default_folder(&self) -> PathBuf {
-        let folder = Path::new("results").join(self.name());
-        self.variant
-            .iter()
-            .fold(folder, |folder, variant| folder.join(variant))
-    }
-
-    /// Name of the case: its folder if the file is called `case.toml`, else the file's stem.
-    pub fn name(&self) -> String {
-        let path = self.source.path();
-        let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-        let named = if absolute.file_name().is_some_and(|name| name == "case.toml") {
-            absolute.parent().and_then(Path::file_name)
-        } else {
-            absolute.file_stem()
-        };
-        named.map_or_else(
-            || "case".to_owned(),
-            |name| name.to_string_lossy().into_owned(),
-        )
-    }
-
-    /// Elements of its grid; `None` where the mesh is in a file.
-    pub fn n_elements(&self) -> Option<usize> {
-        let mesh = &self.file.mesh;
-        let [columns, rows] = [mesh.columns.as_ref()?, mesh.rows.as_ref()?].map(|parts| {
-            let numbers = parts.get_ref().iter().map(|part| part.get_ref().n);
-            numbers.fold(0, usize::saturating_add)
-        });
-        Some(columns.saturating_mul(rows))
-    }
-
-    /// Folders with law libraries, relative to the file that names them.
-    ///
-    /// # Errors
-    /// [`text::Error::Input`] if there is no such folder.
-    pub fn law_folders(&self) -> Result<Vec<PathBuf>, Error> {
-        let folder = |written: &Spanned<PathBuf>| {
-            let file = self.source.path_at(&written.span());
-            let folder = file
-                .parent()
-                .unwrap_or(Path::new("."))
-                .join(written.get_ref());
-            if folder.is_dir() {
-                return Ok(folder);
-            }
-            let message = format!("`law_path`: there is no folder {}", folder.display());
-            Err(self.source.error(written.span(), message).into())
-        };
-        self.file.law_path.iter().map(folder).collect()
-    }
-}
 
 /// The keys of a case file. Units: kN, m, kPa; angles in degrees.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -385,7 +267,7 @@ impl LawInput {
     /// # Errors
     /// [`text::Error::Input`] at the key that does not fit.
     pub fn foreign(&self, source: &Source) -> Result<Option<Foreign>, Error> {
-        self.keys().read(source)
+        foreign(source, self)
     }
 
     /// The zone that its law of solids fills, if it is made so.
@@ -393,26 +275,11 @@ impl LawInput {
     /// # Errors
     /// [`text::Error::Input`] at the key that does not fit.
     pub fn shear_zone(&self, source: &Source) -> Result<Option<ShearZone>, Error> {
-        let (thickness, ratio) = (self.thickness.as_ref(), self.lateral_ratio.as_ref());
-        shear_zone(source, self.keys(), thickness, ratio)
+        shear_zone(source, self)
     }
 
     pub(crate) fn is_shear_zone(&self) -> bool {
-        let adapter = self.adapter.as_ref();
-        adapter.is_some_and(|adapter| *adapter.get_ref() == Route::ShearZone)
-    }
-
-    fn keys(&self) -> ForeignKeys<'_> {
-        ForeignKeys {
-            adapter: self.adapter.as_ref(),
-            library: self.library.as_ref(),
-            sidecar: self.sidecar.as_ref(),
-            in_process: self.in_process.as_ref(),
-            record: self.record.as_ref(),
-            externals: self.externals.as_ref(),
-            scratch: self.scratch.as_ref(),
-            tangent_order: self.tangent_order.as_ref(),
-        }
+        self.adapter.value() == Some(Route::ShearZone)
     }
 }
 
@@ -685,60 +552,6 @@ impl PileInput {
     }
 }
 
-/// Names of groups: one, or a list.
-#[derive(Clone, Debug)]
-pub struct GroupNames(pub Vec<Spanned<String>>);
-
-impl<'de> Deserialize<'de> for GroupNames {
-    fn deserialize<D: Deserializer<'de>>(input: D) -> Result<Self, D::Error> {
-        struct OneOrSeveral;
-        impl<'de> de::Visitor<'de> for OneOrSeveral {
-            type Value = Vec<Spanned<String>>;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str(
-                    "the name of a group, or a list such as [\"shaft_clay\", \"shaft_sand\"]",
-                )
-            }
-
-            fn visit_str<E: de::Error>(self, name: &str) -> Result<Self::Value, E> {
-                Ok(vec![Spanned::new(0..0, name.to_owned())])
-            }
-
-            fn visit_seq<S: de::SeqAccess<'de>>(self, names: S) -> Result<Self::Value, S::Error> {
-                Vec::deserialize(de::value::SeqAccessDeserializer::new(names))
-            }
-        }
-        struct Names(Vec<Spanned<String>>);
-        impl<'de> Deserialize<'de> for Names {
-            fn deserialize<D: Deserializer<'de>>(input: D) -> Result<Self, D::Error> {
-                input.deserialize_any(OneOrSeveral).map(Self)
-            }
-        }
-        let names = Spanned::<Names>::deserialize(input)?;
-        let span = names.span();
-        let placed = |name: Spanned<String>| match name.span() {
-            // One name alone stands where the value does.
-            at if at.is_empty() => Spanned::new(span.clone(), name.into_inner()),
-            _ => name,
-        };
-        Ok(Self(names.into_inner().0.into_iter().map(placed).collect()))
-    }
-}
-
-impl JsonSchema for GroupNames {
-    fn schema_name() -> Cow<'static, str> {
-        "GroupNames".into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        json_schema!({ "anyOf": [
-            { "type": "string" },
-            { "type": "array", "items": { "type": "string" }, "minItems": 1 },
-        ] })
-    }
-}
-
 /// Curves of probes over another probe, of a stress over the integration points of a cut, or of what
 /// holds along the pile.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -811,10 +624,6 @@ pub struct AlongInput {
     pub increments: Vec<usize>,
 }
 
-/// Measured points of a figure: one table of them, or several.
-#[derive(Clone, Debug)]
-pub struct MeasuredTables(pub Vec<MeasuredInput>);
-
 /// Points from two columns of a file of comma-separated values.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -842,41 +651,6 @@ pub struct MeasuredInput {
 
 fn measured() -> String {
     "measured".to_owned()
-}
-
-impl<'de> Deserialize<'de> for MeasuredTables {
-    fn deserialize<D: Deserializer<'de>>(input: D) -> Result<Self, D::Error> {
-        struct OneOrSeveral;
-        impl<'de> de::Visitor<'de> for OneOrSeveral {
-            type Value = MeasuredTables;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a table such as { file = \"test.csv\", x = \"w\", y = \"load\" }, or a list of them")
-            }
-
-            fn visit_map<M: de::MapAccess<'de>>(self, map: M) -> Result<Self::Value, M::Error> {
-                let table = de::value::MapAccessDeserializer::new(map);
-                Ok(MeasuredTables(vec![MeasuredInput::deserialize(table)?]))
-            }
-
-            fn visit_seq<S: de::SeqAccess<'de>>(self, tables: S) -> Result<Self::Value, S::Error> {
-                let tables = de::value::SeqAccessDeserializer::new(tables);
-                Ok(MeasuredTables(Vec::deserialize(tables)?))
-            }
-        }
-        input.deserialize_any(OneOrSeveral)
-    }
-}
-
-impl JsonSchema for MeasuredTables {
-    fn schema_name() -> Cow<'static, str> {
-        "MeasuredTables".into()
-    }
-
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        let one = generator.subschema_for::<MeasuredInput>();
-        json_schema!({ "anyOf": [one, { "type": "array", "items": one }] })
-    }
 }
 
 /// For a file without `[solver]`.

@@ -7,10 +7,12 @@ mod path;
 use crate::Error;
 use crate::case::{FigureInput, LawInput};
 use crate::figures::table_figures;
-use crate::material::{self, LawTables, ParameterTable, ParameterValue, Route, build_law};
+use crate::material::{
+    self, LawTables, ParameterTable, ParameterValue, Route, build_law, internal_variable,
+};
 use crate::schema;
 use indexmap::IndexMap;
-use law::adapter::{Externals, Order, Scratch};
+use law::foreign::{Externals, Order, Scratch};
 use law::{BuiltLaw, LoadedLaw, Opener, Pins, SearchPath};
 use path::{finite, hypothesis, initial_flux, segments};
 use point::{Segment, Vector};
@@ -22,7 +24,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use text::base::{OtherKind, read_kind};
-use text::{Named, Source, suggestion};
+use text::{Named, Source};
 use toml::Spanned;
 
 /// What a case file looks like among driver files.
@@ -284,13 +286,9 @@ impl Driver {
         file: &DriverFile,
         locked: bool,
     ) -> Result<LoadedLaw, Error> {
-        let folder = |written: &Spanned<PathBuf>| {
-            let file = source.path_at(&written.span());
-            file.parent()
-                .unwrap_or(Path::new(""))
-                .join(written.get_ref())
-        };
-        let folders: Vec<PathBuf> = file.law_path.iter().map(folder).collect();
+        let folders = file.law_path.iter();
+        let folders = folders.map(|folder| source.file_named(folder.get_ref(), &folder.span()));
+        let folders: Vec<PathBuf> = folders.collect();
         let entry = file.entry(&Initial::default());
         let tables = LawTables {
             source,
@@ -475,18 +473,9 @@ fn located((source, initial): (&Source, &Range<usize>), error: point::Error) -> 
 /// Internal variables as given, and the law's where nothing is.
 fn internal(source: &Source, point: &point::Driver, given: &Named<f64>) -> Result<Vec<f64>, Error> {
     let mut internal = point.internal().to_vec();
-    let variables = &point.law().formulation().internal_variables;
+    let law = point.law();
     for (name, value) in given {
-        let Some(number) = variables.iter().position(|v| &v.id == name.get_ref()) else {
-            let message = format!(
-                "law `{}` has no internal variable `{}`",
-                point.law().description().id,
-                name.get_ref()
-            );
-            let known = variables.iter().map(|v| v.id.as_str());
-            let hint = suggestion(name.get_ref(), known);
-            return Err(source.error(name.span(), message).hint(hint).into());
-        };
+        let number = internal_variable(source, law, &law.description().id, name)?;
         internal[number] = finite(source, name.get_ref(), value)?;
     }
     Ok(internal)

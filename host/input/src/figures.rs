@@ -4,7 +4,7 @@ use crate::case::{Case, CutInput, FigureInput};
 use crate::{Error, measured};
 use results::output_request::{Cut, Figure};
 use results::pile::OF_STATION;
-use text::{Source, suggestion};
+use text::Source;
 use toml::Spanned;
 
 /// Quantities along a cut; `k_0` is the ratio of radial to vertical stress, both
@@ -60,30 +60,13 @@ pub fn case_figures(case: &Case, names: &[&str]) -> Result<Vec<Figure>, Error> {
         if let Some(group) = figure.points.as_ref().and_then(|cut| cut.group.as_ref())
             && !case.file.groups.contains_key(group.get_ref().as_str())
         {
-            let groups: Vec<&str> = case
-                .file
-                .groups
-                .keys()
-                .map(|k| k.get_ref().as_str())
-                .collect();
-            return Err(source
-                .error(
-                    group.span(),
-                    format!("there is no group `{}`", group.get_ref()),
-                )
-                .hint(suggestion(group.get_ref(), groups))
-                .into());
+            let groups = case.file.groups.keys().map(|k| k.get_ref().as_str());
+            return Err(source.unknown("group", group, groups).into());
         }
         if let Some(phase) = &figure.phase
             && !phases.contains(&phase.get_ref().as_str())
         {
-            return Err(source
-                .error(
-                    phase.span(),
-                    format!("there is no phase `{}`", phase.get_ref()),
-                )
-                .hint(suggestion(phase.get_ref(), phases))
-                .into());
+            return Err(source.unknown("phase", phase, phases).into());
         }
     }
     let figures = case.file.figures.iter();
@@ -146,11 +129,7 @@ fn check_columns(
 ) -> Result<(), Error> {
     for wanted in figure.y.iter().chain([&figure.x]) {
         if !known.contains(&wanted.get_ref().as_str()) {
-            let message = format!("there is no {kind} `{}`", wanted.get_ref());
-            return Err(source
-                .error(wanted.span(), message)
-                .hint(suggestion(wanted.get_ref(), known.to_vec()))
-                .into());
+            return Err(source.unknown(kind, wanted, known.iter().copied()).into());
         }
     }
     Ok(())

@@ -4,7 +4,7 @@ use crate::Error;
 use crate::case::{CaseFile, Coordinate, LineInput, PartInput, RegionInput};
 use mechanics::mesh::{Line, Mesh, Solid};
 use mechanics::problem::{Analysis, Formulation};
-use text::{Source, suggestion};
+use text::Source;
 use toml::Spanned;
 
 /// Columns or rows as the file says them.
@@ -157,18 +157,8 @@ fn element_groups(
             .keys()
             .position(|key| key.get_ref() == name.get_ref());
         let Some(number) = number else {
-            let names: Vec<&str> = file
-                .groups
-                .keys()
-                .map(|key| key.get_ref().as_str())
-                .collect();
-            return Err(source
-                .error(
-                    name.span(),
-                    format!("there is no group `{}`", name.get_ref()),
-                )
-                .hint(suggestion(name.get_ref(), names))
-                .into());
+            let names = file.groups.keys().map(|key| key.get_ref().as_str());
+            return Err(source.unknown("group", name, names).into());
         };
         if file.groups[number].get_ref().formulation == Formulation::ZeroThickness {
             let message = "a `zero_thickness` group is inserted along a line, it takes no region";

@@ -12,7 +12,7 @@ use crate::Error;
 use crate::driver::Driver;
 use crate::material::{ParameterTable, ParameterValue, build_law, find_law};
 use abi::Hypothesis;
-use law::adapter::{Adapter, Foreign};
+use law::foreign::{Adapter, Foreign};
 use law::{Opener, Pins, SearchPath};
 use lines::Lines;
 use point::{Control, Frame, N_MAX, Restrictions, Segment, Vector};

@@ -3,15 +3,16 @@
 use crate::Error;
 use crate::case::LawInput;
 use crate::ground::Over;
+use crate::spanned::Given;
 use abi::Hypothesis;
-use law::adapter::{Adapter, Externals, Foreign, Order, Scratch};
+use law::foreign::{Adapter, Externals, Foreign, Scratch};
 use law::{
-    BuildCause, BuildFailure, BuiltLaw, LoadedLaw, Opener, Pins, SearchPath, ShearZone, Value,
+    BuildCause, BuildFailure, BuiltLaw, Law, LoadedLaw, Opener, Pins, SearchPath, ShearZone, Value,
 };
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use text::{Named, Source, suggestion};
 use toml::Spanned;
 
@@ -85,7 +86,7 @@ pub(crate) fn is_solid_at_interface(failure: &BuildFailure) -> bool {
     let interface = Hypothesis::Interface2d;
     match &failure.cause {
         BuildCause::Hypothesis { offered, wanted } => {
-            *wanted == interface && !offered.contains(interface.name())
+            *wanted == interface && !offered.contains(&interface.name())
         }
         _ => false,
     }
@@ -293,20 +294,14 @@ pub(crate) fn over<T: Clone>(below: Option<&Named<T>>, above: &Named<T>) -> Name
 ///
 /// # Errors
 /// [`text::Error::Input`] at the key that misses another or does not fit.
-pub(crate) fn shear_zone(
-    source: &Source,
-    keys: ForeignKeys<'_>,
-    thickness: Option<&Spanned<f64>>,
-    lateral_ratio: Option<&Spanned<f64>>,
-) -> Result<Option<ShearZone>, Error> {
-    let own = [("thickness", thickness), ("lateral_ratio", lateral_ratio)];
-    let Some(adapter) = keys
-        .adapter
-        .filter(|adapter| *adapter.get_ref() == Route::ShearZone)
-    else {
-        let mut given = own
-            .into_iter()
-            .filter_map(|(key, v)| Some((key, v?.span())));
+pub(crate) fn shear_zone(source: &Source, law: &LawInput) -> Result<Option<ShearZone>, Error> {
+    let own = [
+        ("thickness", law.thickness.place()),
+        ("lateral_ratio", law.lateral_ratio.place()),
+    ];
+    let adapter = law.adapter.as_ref();
+    let Some(adapter) = adapter.filter(|adapter| *adapter.get_ref() == Route::ShearZone) else {
+        let mut given = own.into_iter().filter_map(|(key, at)| Some((key, at?)));
         return match given.next() {
             None => Ok(None),
             Some((key, at)) => {
@@ -315,187 +310,147 @@ pub(crate) fn shear_zone(
             }
         };
     };
-    if let Some((key, at)) = keys.beside_adapter().next() {
+    if let Some((key, at)) = beside_adapter(law).next() {
         let message = format!("`{key}` belongs to the law that fills the zone");
         return Err(source
             .error(at, message)
             .hint("write that law as a table `[laws.NAME]` of its own, and here `law = \"NAME\"`")
             .into());
     }
-    let Some(written) = thickness else {
+    let Some(thickness) = law.thickness.value() else {
         let message = "`adapter = \"shear_zone\"` needs the `thickness` of the zone, m";
         return Err(source.error(adapter.span(), message).into());
     };
     let zone = ShearZone {
-        thickness: *written.get_ref(),
-        lateral_ratio: lateral_ratio.map_or(1.0, |written| *written.get_ref()),
+        thickness,
+        lateral_ratio: law.lateral_ratio.value().unwrap_or(1.0),
     };
     let Some((key, why)) = zone.fault() else {
         return Ok(Some(zone));
     };
     let mut own = own.into_iter();
-    let at = own.find_map(|(other, value)| value.filter(|_| key == other));
-    let at = at.map_or(adapter.span(), Spanned::span);
-    Err(source.error(at, why).into())
+    let at = own.find_map(|(other, at)| at.filter(|_| key == other));
+    Err(source.error(at.unwrap_or(adapter.span()), why).into())
 }
 
-/// Keys of a file besides `law` if the library is made for another program.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ForeignKeys<'a> {
-    /// The key `adapter`.
-    pub(crate) adapter: Option<&'a Spanned<Route>>,
-    /// The key `library`.
-    pub(crate) library: Option<&'a Spanned<PathBuf>>,
-    /// The key `sidecar`.
-    pub(crate) sidecar: Option<&'a Spanned<PathBuf>>,
-    /// The key `in_process`.
-    pub(crate) in_process: Option<&'a Spanned<bool>>,
-    /// The key `record`.
-    pub(crate) record: Option<&'a Spanned<PathBuf>>,
-    /// The key `externals`.
-    pub(crate) externals: Option<&'a Spanned<Externals>>,
-    /// The key `scratch`.
-    pub(crate) scratch: Option<&'a Spanned<Scratch>>,
-    /// The key `tangent_order`.
-    pub(crate) tangent_order: Option<&'a Spanned<Order>>,
+/// The library of a law that is made for another program; `None` if it is one of the contract. Paths are
+/// relative to the file.
+///
+/// # Errors
+/// [`text::Error::Input`] at a key that misses another, or a file that is absent.
+pub(crate) fn foreign(source: &Source, law: &LawInput) -> Result<Option<Foreign>, Error> {
+    let path = |written: &Spanned<PathBuf>| {
+        let path = source.file_named(written.get_ref(), &written.span());
+        std::path::absolute(&path).unwrap_or(path)
+    };
+    let existing = |key: &str, written: &Spanned<PathBuf>| {
+        let path = path(written);
+        if path.is_file() {
+            return Ok(path);
+        }
+        let message = format!("`{key}`: there is no file {}", path.display());
+        Err(Error::from(source.error(written.span(), message)))
+    };
+    let Some(adapter) = &law.adapter else {
+        return match beside_adapter(law).next() {
+            None => Ok(None),
+            Some((key, at)) => Err(source
+                .error(at, format!("`{key}` needs an `adapter`"))
+                .hint(
+                    "libraries of the contract are found by the law's id, more folders are \
+                     named in `law_path`; `adapter = \"umat\"` is for Abaqus user subroutines, \
+                     `adapter = \"mfront\"` for MFront behaviours, `adapter = \"udsm\"` for soil \
+                     models of PLAXIS",
+                )
+                .into()),
+        };
+    };
+    let Some(made_for) = adapter.get_ref().adapter() else {
+        return Ok(None);
+    };
+    let Some(library) = &law.library else {
+        let message = "`adapter` needs the `library` that it is for";
+        return Err(source.error(adapter.span(), message).into());
+    };
+    refuse_of_others(source, law, made_for)?;
+    refuse_without_worker(source, law, made_for)?;
+    let sidecar = law.sidecar.as_ref();
+    Ok(Some(Foreign {
+        adapter: made_for,
+        library: existing("library", library)?,
+        sidecar: sidecar
+            .map(|written| existing("sidecar", written))
+            .transpose()?,
+        in_process: law.in_process.value() == Some(true),
+        record: law.record.as_ref().map(path),
+        records_once: false,
+        externals: law.externals.value(),
+        scratch: law.scratch.value(),
+        tangent_order: law.tangent_order.value(),
+    }))
 }
 
-impl ForeignKeys<'_> {
-    /// The library; `None` if it is one of the contract. Paths are relative to the file.
-    ///
-    /// # Errors
-    /// [`text::Error::Input`] at a key that misses another, or a file that is absent.
-    pub(crate) fn read(self, source: &Source) -> Result<Option<Foreign>, Error> {
-        let path = |written: &Spanned<PathBuf>| {
-            let file = source.path_at(&written.span());
-            let path = file
-                .parent()
-                .unwrap_or(Path::new(""))
-                .join(written.get_ref());
-            std::path::absolute(&path).unwrap_or(path)
-        };
-        let existing = |key: &str, written: &Spanned<PathBuf>| {
-            let path = path(written);
-            if path.is_file() {
-                return Ok(path);
-            }
-            let message = format!("`{key}`: there is no file {}", path.display());
-            Err(Error::from(source.error(written.span(), message)))
-        };
-        let Some(adapter) = self.adapter else {
-            return match self.beside_adapter().next() {
-                None => Ok(None),
-                Some((key, at)) => Err(source
-                    .error(at, format!("`{key}` needs an `adapter`"))
-                    .hint(
-                        "libraries of the contract are found by the law's id, more folders are \
-                         named in `law_path`; `adapter = \"umat\"` is for Abaqus user subroutines, \
-                         `adapter = \"mfront\"` for MFront behaviours, `adapter = \"udsm\"` for soil \
-                         models of PLAXIS",
-                    )
-                    .into()),
-            };
-        };
-        let Some(made_for) = adapter.get_ref().adapter() else {
-            return Ok(None);
-        };
-        let Some(library) = self.library else {
-            let message = "`adapter` needs the `library` that it is for";
-            return Err(source.error(adapter.span(), message).into());
-        };
-        self.refuse_of_others(source, made_for)?;
-        self.refuse_without_worker(source, made_for)?;
-        Ok(Some(Foreign {
-            adapter: made_for,
-            library: existing("library", library)?,
-            sidecar: self
-                .sidecar
-                .map(|written| existing("sidecar", written))
-                .transpose()?,
-            in_process: self.in_process.is_some_and(|written| *written.get_ref()),
-            record: self.record.map(path),
-            records_once: false,
-            externals: self.externals.map(|written| *written.get_ref()),
-            scratch: self.scratch.map(|written| *written.get_ref()),
-            tangent_order: self.tangent_order.map(|written| *written.get_ref()),
-        }))
-    }
+/// Keys that an adapter for a library explains, as they are given.
+fn beside_adapter(law: &LawInput) -> impl Iterator<Item = (&'static str, Range<usize>)> {
+    let given = [
+        ("library", law.library.place()),
+        ("sidecar", law.sidecar.place()),
+        ("in_process", law.in_process.place()),
+        ("record", law.record.place()),
+        ("externals", law.externals.place()),
+        ("scratch", law.scratch.place()),
+        ("tangent_order", law.tangent_order.place()),
+    ];
+    given.into_iter().filter_map(|(key, at)| Some((key, at?)))
+}
 
-    /// Keys that an adapter for a library explains, as they are given.
-    fn beside_adapter(self) -> impl Iterator<Item = (&'static str, Range<usize>)> {
-        let given = [
-            ("library", self.library.map(Spanned::span)),
-            ("sidecar", self.sidecar.map(Spanned::span)),
-            ("in_process", self.in_process.map(Spanned::span)),
-            ("record", self.record.map(Spanned::span)),
-            ("externals", self.externals.map(Spanned::span)),
-            ("scratch", self.scratch.map(Spanned::span)),
-            ("tangent_order", self.tangent_order.map(Spanned::span)),
-        ];
-        given.into_iter().filter_map(|(key, at)| Some((key, at?)))
-    }
-
-    /// Keys that one adapter has and others have not.
-    fn refuse_of_others(self, source: &Source, adapter: Adapter) -> Result<(), Error> {
-        let keys = [
-            ("sidecar", self.sidecar.map(Spanned::span), Adapter::Umat),
-            ("record", self.record.map(Spanned::span), Adapter::Umat),
-            (
-                "tangent_order",
-                self.tangent_order.map(Spanned::span),
-                Adapter::Udsm,
-            ),
-        ];
-        for (key, at, of) in keys {
-            let Some(at) = at.filter(|_| adapter != of) else {
-                continue;
-            };
-            let message = format!("`{key}` is for `adapter = \"{}\"`", of.name());
-            let error = source.error(at, message);
-            return Err(if key == "tangent_order" && adapter == Adapter::Umat {
-                error.hint("of a UMAT the sidecar says it")
-            } else {
-                error
-            }
-            .into());
+/// Keys that one adapter has and others have not.
+fn refuse_of_others(source: &Source, law: &LawInput, adapter: Adapter) -> Result<(), Error> {
+    let keys = [
+        ("sidecar", law.sidecar.place(), Adapter::Umat),
+        ("record", law.record.place(), Adapter::Umat),
+        ("tangent_order", law.tangent_order.place(), Adapter::Udsm),
+    ];
+    for (key, at, of) in keys {
+        let Some(at) = at.filter(|_| adapter != of) else {
+            continue;
+        };
+        let message = format!("`{key}` is for `adapter = \"{}\"`", of.name());
+        let error = source.error(at, message);
+        return Err(if key == "tangent_order" && adapter == Adapter::Umat {
+            error.hint("of a UMAT the sidecar says it")
+        } else {
+            error
         }
-        Ok(())
+        .into());
     }
+    Ok(())
+}
 
-    /// Traps and scratch folders are a matter of the workers of UMATs and UDSMs.
-    fn refuse_without_worker(self, source: &Source, adapter: Adapter) -> Result<(), Error> {
-        let is_trap = |written: &Spanned<Externals>| *written.get_ref() == Externals::Trap;
-        let is_kept = |written: &Spanned<Scratch>| *written.get_ref() == Scratch::Keep;
-        let keys = [
-            (
-                "externals",
-                self.externals.map(Spanned::span),
-                self.externals.is_some_and(is_trap),
-            ),
-            (
-                "scratch",
-                self.scratch.map(Spanned::span),
-                self.scratch.is_some_and(is_kept),
-            ),
-        ];
-        let in_process = self.in_process.is_some_and(|written| *written.get_ref());
-        for (key, at, needs_worker) in keys {
-            let Some(at) = at else { continue };
-            if adapter == Adapter::Mfront {
-                let message =
-                    format!("`{key}` is for `adapter = \"umat\"` and `adapter = \"udsm\"`");
-                return Err(source.error(at, message).into());
-            }
-            if needs_worker && in_process {
-                let message = format!("`{key}` needs a worker process");
-                return Err(source
-                    .error(at, message)
-                    .hint("leave out `in_process`")
-                    .into());
-            }
+/// Traps and scratch folders are a matter of the workers of UMATs and UDSMs.
+fn refuse_without_worker(source: &Source, law: &LawInput, adapter: Adapter) -> Result<(), Error> {
+    let is_trap = law.externals.value() == Some(Externals::Trap);
+    let is_kept = law.scratch.value() == Some(Scratch::Keep);
+    let keys = [
+        ("externals", law.externals.place(), is_trap),
+        ("scratch", law.scratch.place(), is_kept),
+    ];
+    let in_process = law.in_process.value() == Some(true);
+    for (key, at, needs_worker) in keys {
+        let Some(at) = at else { continue };
+        if adapter == Adapter::Mfront {
+            let message = format!("`{key}` is for `adapter = \"umat\"` and `adapter = \"udsm\"`");
+            return Err(source.error(at, message).into());
         }
-        Ok(())
+        if needs_worker && in_process {
+            let message = format!("`{key}` needs a worker process");
+            return Err(source
+                .error(at, message)
+                .hint("leave out `in_process`")
+                .into());
+        }
     }
+    Ok(())
 }
 
 /// A law that a table describes by itself: the keys of one of a case's [`laws`](crate::case::CaseFile).
@@ -524,22 +479,39 @@ pub fn law_alone(
         None => only_hypothesis(&loaded).map_err(|why| source.error(entry.law.span(), why))?,
     };
     let built = build_law(source, &loaded, &entry.law, hypothesis, &entry.parameters)?;
-    let variables = &built.law.formulation().internal_variables;
     let mut initial = Vec::new();
     for (key, value) in &entry.initial {
-        let id = key.get_ref();
-        let Some(number) = variables.iter().position(|variable| variable.id == *id) else {
-            let names: Vec<&str> = variables.iter().map(|v| v.id.as_str()).collect();
-            let message = format!(
-                "law `{}` has no internal variable `{id}`",
-                entry.law.get_ref()
-            );
-            let error = source.error(key.span(), message);
-            return Err(error.hint(suggestion(id, names)).into());
-        };
+        let number = internal_variable(source, &built.law, entry.law.get_ref(), key)?;
         initial.push((number, *value.get_ref()));
     }
     Ok((built, initial))
+}
+
+/// Number of an internal variable of a law that is called so.
+pub(crate) fn internal_variable(
+    source: &Source,
+    law: &Law,
+    called: &str,
+    variable: &Spanned<String>,
+) -> Result<usize, Error> {
+    let variables = &law.formulation().internal_variables;
+    let id = variable.get_ref();
+    let number = variables.iter().position(|variable| variable.id == *id);
+    let known = variables.iter().map(|v| v.id.as_str());
+    number.ok_or_else(|| no_internal_variable(source, called, variable, known.collect()))
+}
+
+/// The error of an internal variable that a law has not: it has these.
+pub(crate) fn no_internal_variable(
+    source: &Source,
+    law: &str,
+    variable: &Spanned<String>,
+    known: Vec<&str>,
+) -> Error {
+    let id = variable.get_ref();
+    let message = format!("law `{law}` has no internal variable `{id}`");
+    let error = source.error(variable.span(), message);
+    error.hint(suggestion(id, known)).into()
 }
 
 /// The one hypothesis that a law is made for, interfaces in space aside: those are asked for.

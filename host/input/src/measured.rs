@@ -18,11 +18,7 @@ const MOST_POINTS: usize = 20_000;
 /// [`text::Error::Input`] at the key that does not fit: the file cannot be read, a column is
 /// missing, a cell is not a number, there are no points or too many.
 pub(crate) fn read(source: &Source, input: &MeasuredInput) -> Result<Measured, Error> {
-    let case = source.path_at(&input.file.span());
-    let path = case
-        .parent()
-        .unwrap_or(Path::new(""))
-        .join(input.file.get_ref());
+    let path = source.file_named(input.file.get_ref(), &input.file.span());
     let at_file = |message: String| Error::from(source.error(input.file.span(), message));
     let bytes = read_text(&path)
         .map_err(|why| at_file(format!("`file`: cannot read {}: {why}", path.display())))?;

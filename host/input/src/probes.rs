@@ -177,14 +177,8 @@ impl Resolver<'_> {
             .iter()
             .position(|g| g.name == *name.get_ref())
             .ok_or_else(|| {
-                let names: Vec<&str> = groups.iter().map(|g| g.name.as_str()).collect();
-                self.source()
-                    .error(
-                        name.span(),
-                        format!("there is no group `{}`", name.get_ref()),
-                    )
-                    .hint(suggestion(name.get_ref(), names))
-                    .into()
+                let names = groups.iter().map(|g| g.name.as_str());
+                self.source().unknown("group", name, names).into()
             })
     }
 

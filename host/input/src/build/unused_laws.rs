@@ -4,7 +4,7 @@
 use super::LawShelf;
 use crate::Error;
 use crate::case::LawInput;
-use crate::material::{given, place_failure, try_law};
+use crate::material::{given, no_internal_variable, place_failure, try_law};
 use abi::Hypothesis;
 use law::{BuildCause, BuildFailure, LoadedLaw};
 use std::collections::BTreeSet;
@@ -94,7 +94,9 @@ impl LawShelf<'_> {
         let given = self.tables().initial(entry);
         let unknown = given.keys().find(|id| !ids.contains(id.get_ref().as_str()));
         let ids = ids.into_iter().collect();
-        unknown.map_or(Ok(()), |id| Err(self.no_variable(&law.id, id, ids)))
+        unknown.map_or(Ok(()), |id| {
+            Err(no_internal_variable(self.source, &law.id, id, ids))
+        })
     }
 
     /// The law of a table, where a table that is taken is of the same one.

@@ -1,0 +1,170 @@
+//! The laws of a case, opened and built as its groups take them.
+
+use super::Laws;
+use crate::Error;
+use crate::case::{CaseFile, GroupInput, LawInput};
+use crate::ground::ProfileInput;
+use crate::material::{
+    LawTables, ParameterValue, ZONE, internal_variable, is_solid_at_interface, place_failure,
+    try_law,
+};
+use abi::Hypothesis;
+use law::{BuildCause, LoadedLaw, SearchPath};
+use mechanics::model;
+use mechanics::problem::{Formulation, Material, Profile};
+use std::sync::Arc;
+use text::{Source, suggestion};
+use toml::Spanned;
+
+/// Laws built so far; each once for every hypothesis.
+pub(super) struct LawShelf<'a> {
+    pub(super) source: &'a Source,
+    pub(super) file: &'a CaseFile,
+    pub(super) search: SearchPath,
+    pub(super) laws: Laws,
+}
+
+impl<'a> LawShelf<'a> {
+    /// What the file says under a law's name.
+    pub(super) fn entry(&self, name: &Spanned<String>) -> Result<&'a LawInput, Error> {
+        let laws = &self.file.laws;
+        let entry = laws.iter().find(|(key, _)| key.get_ref() == name.get_ref());
+        entry.map(|(_, entry)| entry.get_ref()).ok_or_else(|| {
+            let names: Vec<&str> = laws.keys().map(|k| k.get_ref().as_str()).collect();
+            let message = format!("there is no law `{}` under [laws]", name.get_ref());
+            self.source
+                .error(name.span(), message)
+                .hint(suggestion(name.get_ref(), names))
+                .into()
+        })
+    }
+
+    /// The law without its parameters.
+    pub(super) fn loaded(&self, entry: &LawInput) -> Result<LoadedLaw, Error> {
+        self.tables().loaded(&self.search, entry)
+    }
+
+    pub(super) fn tables(&self) -> LawTables<'a> {
+        LawTables {
+            source: self.source,
+            tables: &self.file.laws,
+        }
+    }
+
+    /// The law of this name, for a group.
+    pub(super) fn material(
+        &mut self,
+        group_name: &Spanned<String>,
+        group: &GroupInput,
+        name: &Spanned<String>,
+    ) -> Result<Material, Error> {
+        let entry = self.entry(name)?;
+        let is_interface_law = group.formulation == Formulation::ThinLayer
+            && self.loaded(entry).is_ok_and(|law| {
+                let offered = law.description().formulation(Hypothesis::Interface2d);
+                offered.is_some()
+            });
+        let hypothesis = model::hypothesis(self.file.analysis, group.formulation, is_interface_law);
+        let key = (name.get_ref().clone(), hypothesis.name());
+        let built = if let Some(built) = self.laws.get(&key) {
+            Arc::clone(built)
+        } else {
+            let parameters = &self.tables().parameters(entry);
+            let loaded = self.loaded(entry)?;
+            let built = try_law(&loaded, hypothesis, parameters).map_err(|failure| {
+                let error = place_failure(self.source, &entry.law, parameters, &failure);
+                if !matches!(failure.cause, BuildCause::Hypothesis { .. }) {
+                    error
+                } else if let Some(adapter) =
+                    entry.adapter.as_ref().filter(|_| entry.is_shear_zone())
+                {
+                    let message = format!(
+                        "law `{}` is a shear zone, made for interface_2d, expected {}",
+                        name.get_ref(),
+                        hypothesis.name()
+                    );
+                    let error = self.source.error(adapter.span(), message);
+                    self.explain(error.into(), group_name, group, name)
+                } else {
+                    let error = self.explain(error, group_name, group, name);
+                    if is_solid_at_interface(&failure) {
+                        error.with_hint(ZONE)
+                    } else {
+                        error
+                    }
+                }
+            })?;
+            let built = Arc::new(built);
+            self.laws.insert(key, Arc::clone(&built));
+            built
+        };
+        let mut material = Material::new(name.get_ref(), built);
+        material.varying = self.varying(entry, hypothesis)?;
+        let law = &material.built.law;
+        for (variable, value) in &self.tables().initial(entry) {
+            if !value.get_ref().is_finite() {
+                let message = "expected a finite number";
+                return Err(self.source.error(value.span(), message).into());
+            }
+            let id = &law.description().id;
+            let number = internal_variable(self.source, law, id, variable)?;
+            material.initial.push((number, *value.get_ref()));
+        }
+        Ok(material)
+    }
+
+    /// Parameters of a law that vary with the height; every value is held against its bounds.
+    pub(super) fn varying(
+        &self,
+        entry: &LawInput,
+        hypothesis: Hypothesis,
+    ) -> Result<Vec<(String, Profile)>, Error> {
+        let given = self.tables().parameters(entry);
+        let mut varying = Vec::new();
+        for (id, value) in &given {
+            if let ParameterValue::Varying(over) = value.get_ref() {
+                let profile = ProfileInput::Over(over.clone()).read(self.source, value.span())?;
+                varying.push((id.get_ref().clone(), profile));
+            }
+        }
+        let most = varying
+            .iter()
+            .map(|(_, profile)| profile.points().len())
+            .max();
+        for point in 1..most.unwrap_or(0) {
+            let mut parameters = given.clone();
+            for value in parameters.values_mut() {
+                if let ParameterValue::Varying(over) = value.get_mut() {
+                    let last = over.z.len() - 1;
+                    over.z = vec![over.z[point.min(last)]];
+                }
+            }
+            let loaded = self.loaded(entry)?;
+            try_law(&loaded, hypothesis, &parameters)
+                .map_err(|failure| place_failure(self.source, &entry.law, &given, &failure))?;
+        }
+        Ok(varying)
+    }
+
+    /// Adds what the group expects to an error about the law's hypothesis.
+    fn explain(
+        &self,
+        error: Error,
+        name: &Spanned<String>,
+        group: &GroupInput,
+        law: &Spanned<String>,
+    ) -> Error {
+        let Error::Text(text::Error::Input(input)) = error else {
+            return error;
+        };
+        let label = format!("taken by group `{}`", name.get_ref());
+        let input = self.source.mark(*input, law.span(), label);
+        let hint = format!(
+            "group `{}` has the formulation `{}` in the analysis `{}`",
+            name.get_ref(),
+            group.formulation.name(),
+            self.file.analysis.name()
+        );
+        input.hint(hint).into()
+    }
+}
