@@ -4,7 +4,6 @@
 //! for the values whose curves come nearest, by least squares from several starts, and reports how
 //! well the tests determine them.
 
-mod cache;
 mod coordinates;
 mod curve;
 mod derivatives;
@@ -16,35 +15,37 @@ mod messages;
 mod misfit;
 mod model;
 mod output;
-mod page;
 mod parameter_block;
 mod profile;
 mod propagation;
 mod rates;
 mod setup;
+mod stage;
 mod statistics;
 mod systematic;
 
 pub use coordinates::Parameter;
 pub use curve::Curve;
-pub use fit::{Group, Landing, Optimum, Stage};
 pub use fitted::{Fitted, FittedCurve};
 pub use least_squares::End;
 pub use profile::{Profile, Side};
+pub use stage::{Group, Landing, Optimum, Stage};
 pub use statistics::Covariance;
 pub use systematic::{Follow, Systematic};
 
 use crate::Error;
-use crate::variants::keep;
+use crate::variants::{folder, keep};
 use fit::{Wish, fit};
 use fitted::fitted;
 use input::Kind;
-use input::calibration::{Calibration, Variance};
+use input::calibration::{Calibration, StageInput, Variance};
 use law::{Opener, Stop, Stopped};
 use model::{Model, Subject};
 use parameter_block::block;
 use propagation::Errors;
+use stage::last_stage;
 use std::path::{Path, PathBuf};
+use toml::Spanned;
 
 /// Settings of a calibration.
 #[derive(Clone, Debug)]
@@ -211,7 +212,7 @@ pub fn run(
             }
         })?;
         output::write(&outcome, calibration, &folder)?;
-        cache::remove(&folder);
+        model::forget(&folder);
         show(&outcome.text());
         show(&format!("results in {}", folder.display()));
         show(&format!(
@@ -225,12 +226,9 @@ pub fn run(
 impl Options {
     /// Folder of one calibration: that of all, or one inside it for each variant.
     fn folder(&self, calibration: &Calibration) -> PathBuf {
-        let default = || Path::new("results").join(format!("calibrate_{}", calibration.name()));
-        let folder = self.out.clone().unwrap_or_else(default);
-        match &calibration.variant {
-            Some(variant) if self.variant.is_none() => folder.join(variant),
-            _ => folder,
-        }
+        let name = format!("calibrate_{}", calibration.name());
+        let variant = calibration.variant.as_deref();
+        folder(self.out.as_deref(), &name, variant, self.variant.as_deref())
     }
 }
 
@@ -269,7 +267,7 @@ pub fn calibrate(
         .into(),
         Kind::Internal => error,
         _ => {
-            cache::remove(folder);
+            model::forget(folder);
             error
         }
     })
@@ -323,23 +321,9 @@ fn carry_out(
         words.extend(of_stage.into_iter().map(name));
         stages.push(stage);
     }
-    let last = |parameter: usize| {
-        let of = |(number, stage): (usize, &Stage)| {
-            let place = stage
-                .group
-                .parameters
-                .iter()
-                .position(|&p| p == parameter)?;
-            Some((number, place))
-        };
-        stages
-            .iter()
-            .enumerate()
-            .rev()
-            .find_map(of)
-            .unwrap_or((0, 0))
-    };
-    let places: Vec<(usize, usize)> = (0..model.parameters.len()).map(last).collect();
+    let places = 0..model.parameters.len();
+    let places = places.map(|parameter| last_stage(&stages, parameter).unwrap_or((0, 0)));
+    let places: Vec<(usize, usize)> = places.collect();
     if groups.len() > 1 {
         words.extend(messages::of_stages(model, &stages, &places, &errors));
     }
@@ -373,12 +357,7 @@ fn carry_out(
 
 /// The stages of the file, or one of all.
 fn groups(calibration: &Calibration, model: &Model) -> Vec<Group> {
-    let fitted = || {
-        let tests = model.tests.iter().enumerate();
-        tests
-            .filter(|(_, test)| !test.is_predicted)
-            .map(|(number, _)| number)
-    };
+    let fitted = || (0..model.tests.len()).filter(|&test| !model.tests[test].is_predicted);
     let stages = &calibration.file.stage;
     if stages.is_empty() {
         return vec![Group {
@@ -387,25 +366,23 @@ fn groups(calibration: &Calibration, model: &Model) -> Vec<Group> {
             tests: fitted().collect(),
         }];
     }
-    let named = |stage: &input::calibration::StageInput| {
-        let is_in = |name: &str| stage.free.iter().any(|free| free.get_ref() == name);
-        let has = |&test: &usize| {
-            let name = &model.tests[test].name;
-            stage.tests.is_empty() || stage.tests.iter().any(|other| other.get_ref() == name)
-        };
-        let tests: Vec<usize> = fitted().filter(has).collect();
+    let named = |stage: &StageInput| {
+        let is_in = |names: &[Spanned<String>], name| names.iter().any(|one| one.get_ref() == name);
+        let tests = fitted()
+            .filter(|&test| stage.tests.is_empty() || is_in(&stage.tests, &model.tests[test].name));
+        let tests: Vec<usize> = tests.collect();
         // How a curve was read is looked for wherever its test is.
-        let is_of_stage = |p: &Parameter| match p.of_curve {
-            Some((test, _)) => tests.contains(&test),
-            None => is_in(&p.name),
+        let is_of_stage = |parameter: &usize| {
+            let p = &model.parameters[*parameter];
+            match p.of_curve {
+                Some((test, _)) => tests.contains(&test),
+                None => is_in(&stage.free, &p.name),
+            }
         };
-        let parameters = model.parameters.iter().enumerate();
+        let parameters = (0..model.parameters.len()).filter(is_of_stage);
         Group {
             name: stage.name.get_ref().clone(),
-            parameters: parameters
-                .filter(|(_, p)| is_of_stage(p))
-                .map(|(i, _)| i)
-                .collect(),
+            parameters: parameters.collect(),
             tests,
         }
     };

@@ -2,6 +2,7 @@
 //! watch over what laws do to the process.
 
 pub mod calibration;
+mod experiment;
 #[expect(unsafe_code, reason = "the program's allocator")]
 #[cfg(unix)]
 pub mod memory;

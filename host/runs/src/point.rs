@@ -3,8 +3,8 @@
 use crate::Error;
 use crate::variants::keep;
 use input::driver::Driver;
-use law::adapter::Adapter;
 use law::capsule::{self, Capsule};
+use law::foreign::Adapter;
 use law::{Opener, Stop};
 use point::Course;
 use results::figure::Figures;
@@ -103,7 +103,7 @@ impl fmt::Display for PointReport {
 pub fn run_file(path: &Path, csv: Option<&Path>) -> Result<PointReport, Error> {
     let mut last = None;
     run_file_variants(path, None, csv, |report| last = Some(report.clone()))?;
-    last.ok_or_else(|| text::Error::Internal("a driver file without drivers".to_owned()).into())
+    last.ok_or_else(|| Error::internal("a driver file without drivers"))
 }
 
 /// Runs a driver file: all its variants one after the other, or one of them. Rows go to `csv`, or
@@ -202,13 +202,15 @@ fn name(driver: &Driver) -> Option<&str> {
 /// Only one run of a UMAT can be recorded.
 fn check_recording(drivers: &[Driver]) -> Result<(), Error> {
     let [driver] = drivers else {
-        return Err(usage("--record is for one run: name one with --variant"));
+        return Err(Error::usage(
+            "--record is for one run: name one with --variant",
+        ));
     };
     let law = driver.point().law();
     let foreign = law.library().foreign();
     if foreign.is_none_or(|foreign| foreign.adapter != Adapter::Umat) {
         let id = &law.description().id;
-        return Err(usage(format!("--record: law `{id}` is no UMAT")));
+        return Err(Error::usage(format!("--record: law `{id}` is no UMAT")));
     }
     Ok(())
 }
@@ -220,7 +222,7 @@ fn run_to_stdout(
     report: &mut dyn FnMut(&PointReport),
 ) -> Result<(), Error> {
     let [driver] = drivers else {
-        return Err(usage(format!(
+        return Err(Error::usage(format!(
             "{} has variants: give --csv FILE for all of them, or --variant NAME for one of {}",
             path.display(),
             names.join(", ")
@@ -228,14 +230,14 @@ fn run_to_stdout(
     };
     let name = Path::new("the standard output");
     let mut figures = empty_figures(driver);
-    match follow(driver, crate::supervision::stdout(), name, &mut figures) {
+    match follow(driver, crate::supervision::stdout(), &mut figures) {
         Ok(done) => {
             report(&done);
             Ok(())
         }
         // Whoever reads the rows has read enough.
         Err(Ended::Unwritable(source)) if source.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-        Err(ended) => Err(ended.at(name)),
+        Err(ended) => Err(ended.at(driver, name)),
     }
 }
 
@@ -253,7 +255,7 @@ fn run_to_files(
     for driver in drivers {
         let csv = target(driver);
         if is_same(path, &csv) {
-            return Err(usage(format!(
+            return Err(Error::usage(format!(
                 "--csv {} would overwrite the driver file",
                 csv.display()
             )));
@@ -271,9 +273,9 @@ fn run_to_files(
             file,
             length: 0,
         };
-        let result = follow(driver, out, &csv, &mut figures);
+        let result = follow(driver, out, &mut figures);
         drawn.push((name(driver).unwrap_or_default().to_owned(), figures));
-        let mut done = result.map_err(|ended| ended.at(&csv))?;
+        let mut done = result.map_err(|ended| ended.at(driver, &csv))?;
         done.csv = Some(csv);
         report(&done);
         Ok(())
@@ -284,10 +286,6 @@ fn run_to_files(
         several => Figures::draw_overlaid(folder, several),
     };
     outcome.and(figures.map_err(Error::from))
-}
-
-fn usage(message: impl Into<String>) -> Error {
-    text::Error::Usage(message.into()).into()
 }
 
 /// `a/b.csv` to `a/b_<variant>.csv`.
@@ -330,7 +328,7 @@ impl Write for Guarded {
 /// # Errors
 /// As [`run_file_until`]; the rows found until then have been written.
 pub fn write_csv(driver: &Driver, out: impl Write, name: &Path) -> Result<PointReport, Error> {
-    follow(driver, out, name, &mut empty_figures(driver)).map_err(|ended| ended.at(name))
+    follow(driver, out, &mut empty_figures(driver)).map_err(|ended| ended.at(driver, name))
 }
 
 /// The figures of a driver, still without curves.
@@ -338,39 +336,32 @@ fn empty_figures(driver: &Driver) -> Figures {
     Figures::new(driver.title(), driver.figures(), drawable(driver.point()))
 }
 
-/// Why a table ends early.
-enum Ended {
-    Unwritable(io::Error),
-    Failed(Error),
-}
-
-impl Ended {
-    fn at(self, name: &Path) -> Error {
-        match self {
-            Self::Unwritable(source) => text::Error::unwritable(name, source).into(),
-            Self::Failed(error) => error,
-        }
-    }
-}
-
 /// Why no more rows come.
-enum NoMore {
+enum Ended {
     Unwritable(io::Error),
     Point(point::Error),
 }
 
-impl From<point::Error> for NoMore {
+impl Ended {
+    /// The error of a table of this name.
+    fn at(self, driver: &Driver, name: &Path) -> Error {
+        match self {
+            Self::Unwritable(source) => text::Error::unwritable(name, source).into(),
+            Self::Point(error) => match with_capsule(driver, error, name) {
+                Ok(error) => driver.located(error),
+                Err(error) => error,
+            },
+        }
+    }
+}
+
+impl From<point::Error> for Ended {
     fn from(error: point::Error) -> Self {
         Self::Point(error)
     }
 }
 
-fn follow(
-    driver: &Driver,
-    out: impl Write,
-    name: &Path,
-    figures: &mut Figures,
-) -> Result<PointReport, Ended> {
+fn follow(driver: &Driver, out: impl Write, figures: &mut Figures) -> Result<PointReport, Ended> {
     let point = driver.point();
     // What came through a pipe cannot be read once more.
     let mut table = Table::new(out, point, !driver.path().is_file());
@@ -382,19 +373,12 @@ fn follow(
         if has_figures {
             draw_row(point, figures, row);
         }
-        table.write(row).map_err(NoMore::Unwritable)
+        table.write(row).map_err(Ended::Unwritable)
     });
-    if !matches!(result, Err(NoMore::Unwritable(_))) {
+    if !matches!(result, Err(Ended::Unwritable(_))) {
         table.flush().map_err(Ended::Unwritable)?;
     }
-    match result {
-        Ok(course) => Ok(PointReport::new(point, course)),
-        Err(NoMore::Unwritable(source)) => Err(Ended::Unwritable(source)),
-        Err(NoMore::Point(error)) => {
-            let error = with_capsule(driver, error, name).map_err(Ended::Failed)?;
-            Err(Ended::Failed(driver.located(error)))
-        }
-    }
+    Ok(PointReport::new(point, result?))
 }
 
 /// Writes the call of the law behind an error next to a table that is a file, and reports it. A table on

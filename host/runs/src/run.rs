@@ -1,20 +1,23 @@
 //! One run: from a case to a folder with results.
 
+mod failure;
+mod keeper;
+
 use crate::Error;
 use crate::run_status::{ending, process};
+use failure::explained;
+use input::Case;
 use input::build::{Laws, Posed};
 use input::mesh::MeshFile;
-use input::{Case, Kind, probes};
-use law::capsule::{self, Capsule};
-use law::{Library, Stop, hexadecimal_sha256};
+use keeper::Keeper;
+use law::{Stop, hexadecimal_sha256};
 use mechanics::equilibrium::{Iteration, Reason, Reuse};
-use mechanics::group::{Group, PointFailure};
-use mechanics::settings::Method;
+use mechanics::group::Group;
 use mechanics::simulation::{Increment, Part, PhaseRecord, Snapshot, Warning, When};
 use mechanics::{Place, Problem, Simulation, State, Watch};
 use results::output_request::OutputRequest;
 use results::pile::Resistances;
-use results::{Checkpoint, Fault, Figures, Recorder, report};
+use results::{About, Checkpoint, Fault, Figures, Recorder, report};
 use std::fmt::Write as _;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -23,13 +26,13 @@ use std::time::{Duration, Instant};
 /// Progress of a run, for whoever shows it.
 pub trait Observer {
     /// A phase begins.
-    fn phase(&mut self, name: &str, increments: usize);
+    fn phase(&mut self, _name: &str, _increments: usize) {}
     /// An increment reached equilibrium.
-    fn increment(&mut self, place: &Place, of: usize, iterations: usize);
+    fn increment(&mut self, _place: &Place, _of: usize, _iterations: usize) {}
     /// An increment is repeated with smaller steps.
-    fn cut_back(&mut self, place: &Place, reason: &str);
+    fn cut_back(&mut self, _place: &Place, _reason: &str) {}
     /// Something the user should know.
-    fn warning(&mut self, message: &str);
+    fn warning(&mut self, _message: &str) {}
     /// Activity before the first phase.
     fn note(&mut self, _message: &str) {}
     /// The ground was found at rest in this phase but for a share of its weight, which the phase
@@ -65,18 +68,18 @@ pub struct Options {
 ///
 /// # Errors
 /// Bad input, or trouble with a library.
-pub fn begin(case: &Case, reuse: Reuse) -> Result<(Simulation, Laws), Error> {
+pub(crate) fn begin(case: &Case) -> Result<(Simulation, Laws), Error> {
     let Posed { problem, laws, .. } = case.pose()?;
-    let simulation = Simulation::reusing(problem, reuse).map_err(|error| case.place(error))?;
+    let simulation = Simulation::new(problem).map_err(|error| case.place(error))?;
     Ok((simulation, laws))
 }
 
 /// Checks everything about a case that can be checked without running it.
 ///
 /// # Errors
-/// As [`begin`].
+/// Bad input, or trouble with a library.
 pub fn check(case: &Case) -> Result<(), Error> {
-    let (simulation, _) = begin(case, Reuse::default())?;
+    let (simulation, _) = begin(case)?;
     case.wanted(&simulation)?;
     Ok(())
 }
@@ -85,7 +88,7 @@ pub fn check(case: &Case) -> Result<(), Error> {
 /// is into `folder`, which must not hold results. Returns the report's path.
 ///
 /// # Errors
-/// As [`begin`]; results in the folder, or a folder that cannot be written.
+/// As [`check`]; results in the folder, or a folder that cannot be written.
 pub fn dry_run(case: &Case, folder: &Path, observer: &mut dyn Observer) -> Result<PathBuf, Error> {
     let Posed {
         problem,
@@ -240,113 +243,101 @@ impl Ready<'_> {
         reuse: &mut Reuse,
         options: Options,
     ) -> Result<Figures, Error> {
-        carry_out(self, folder, observer, reuse, options)
+        let Self { case, posed, .. } = self;
+        #[cfg(unix)]
+        {
+            reuse.announces = Some(crate::memory::expect);
+        }
+        let mut simulation = Simulation::reusing(posed.problem, std::mem::take(reuse))
+            .map_err(|error| case.place(error))?;
+        let wanted = case.wanted(&simulation)?;
+        let about = case.about(&posed.laws, posed.mesh_file.as_ref());
+        let keeper = Keeper::new(self.identity, folder, options);
+        let found = if options.resume {
+            keeper.found()?
+        } else {
+            None
+        };
+        let (mut results, warnings) = match found {
+            Some(checkpoint) if checkpoint.run.is_none() => {
+                checkpoint.results.check(folder)?;
+                observer.resumed(None);
+                return Ok(checkpoint.results.figures(&wanted));
+            }
+            Some(checkpoint) => {
+                let (folder, wanted) = (folder, (wanted, &about));
+                resume(checkpoint, folder, wanted, &mut simulation, observer)?
+            }
+            None => {
+                let seen = (&simulation, &wanted);
+                let warnings = all_warnings(case, &posed.laws, seen, posed.notes);
+                for warning in &warnings {
+                    observer.warning(warning);
+                }
+                let results = Recorder::create(folder, wanted, &about, &simulation)?;
+                (results, warnings)
+            }
+        };
+        if !options.reports {
+            results.makes_no_report();
+        }
+        process::writes(Some(folder));
+        let mut follower = Follower {
+            stop: observer.stop(),
+            observer,
+            results,
+            keeper,
+            warnings,
+            report: options.reports.then(|| report::Running::new(folder)),
+            fault: None,
+        };
+        let outcome = follower.follow(case, &mut simulation);
+        let Follower {
+            observer,
+            mut results,
+            keeper,
+            warnings,
+            ..
+        } = follower;
+        let finished = results.finish(
+            simulation.groups(),
+            self.started.elapsed(),
+            &warnings,
+            &ending(outcome.as_ref().err()),
+        );
+        process::writes(None);
+        observer.written(results.known());
+        *reuse = simulation.into_reuse();
+        let is_done = outcome.is_ok();
+        outcome.and(finished.map_err(Error::from))?;
+        if is_done {
+            keeper.end(&results, &warnings)?;
+        }
+        Ok(results.figures().clone())
     }
 }
 
-fn carry_out(
-    ready: Ready<'_>,
+/// Goes on from a checkpoint in the middle of a run. Returns its results and warnings until there.
+fn resume(
+    checkpoint: Checkpoint<'_>,
     folder: &Path,
+    (wanted, about): (OutputRequest, &About),
+    simulation: &mut Simulation,
     observer: &mut dyn Observer,
-    reuse: &mut Reuse,
-    options: Options,
-) -> Result<Figures, Error> {
-    let Ready {
-        case,
-        posed,
-        identity,
-        started,
-    } = ready;
-    #[cfg(unix)]
-    {
-        reuse.announces = Some(crate::memory::expect);
-    }
-    let Posed {
-        problem,
-        laws,
-        mesh_file,
-        notes,
-    } = posed;
-    let mut simulation =
-        Simulation::reusing(problem, std::mem::take(reuse)).map_err(|error| case.place(error))?;
-    let wanted = case.wanted(&simulation)?;
-    let about = case.about(&laws, mesh_file.as_ref());
-    let keeper = Keeper::new(identity, folder, options);
-    let found = if options.resume {
-        keeper.found()?
-    } else {
-        None
+) -> Result<(Recorder, Vec<String>), Error> {
+    let Some(state) = checkpoint.run else {
+        return Err(Error::internal("a checkpoint without a state"));
     };
-    let mut warnings = Vec::new();
-    let mut results = if let Some(checkpoint) = found {
-        let Some(state) = checkpoint.run else {
-            checkpoint.results.check(folder)?;
-            observer.resumed(None);
-            return Ok(checkpoint.results.figures(&wanted));
-        };
-        let phases = &simulation.problem().phases;
-        let place = phases.get(state.phase).map(|phase| Place {
-            phase: phase.name.clone(),
-            increment: state.increment(),
-        });
-        observer.resumed(place.as_ref());
-        warnings = checkpoint.warnings.into_owned();
-        let at = (folder, checkpoint.results);
-        let results = Recorder::resume(at.0, wanted, &about, &simulation, at.1)?;
-        let phase = &simulation.problem().phases[state.phase];
-        observer.phase(&phase.name, phase.increments);
-        simulation.go_to(state.into_owned())?;
-        results
-    } else {
-        let all = all_warnings(case, &laws, (&simulation, &wanted), notes);
-        for warning in &all {
-            observer.warning(warning);
-        }
-        warnings.extend(all);
-        Recorder::create(folder, wanted, &about, &simulation)?
-    };
-    if !options.reports {
-        results.makes_no_report();
-    }
-    process::writes(Some(folder));
-    let mut follower = Follower {
-        stop: observer.stop(),
-        observer,
-        results,
-        keeper,
-        warnings,
-        report: options.reports.then(|| report::Running::new(folder)),
-        fault: None,
-    };
-    let outcome = simulation.run(&mut follower);
-    let (beyond, unreliable) = (simulation.beyond_theory(), follower.results.unreliable());
-    for warning in beyond.iter().chain(&unreliable) {
-        follower.say(warning);
-    }
-    let outcome = outcome.map_err(|error| explained(case, &simulation, error, &mut follower));
-    follower.tell_results(outcome.is_ok());
-    let Follower {
-        observer,
-        mut results,
-        keeper,
-        warnings,
-        ..
-    } = follower;
-    let finished = results.finish(
-        simulation.groups(),
-        started.elapsed(),
-        &warnings,
-        &ending(outcome.as_ref().err()),
-    );
-    process::writes(None);
-    observer.written(results.known());
-    *reuse = simulation.into_reuse();
-    let is_done = outcome.is_ok();
-    outcome.and(finished.map_err(Error::from))?;
-    if is_done {
-        keeper.end(&results, &warnings)?;
-    }
-    Ok(results.figures().clone())
+    let phase = &simulation.problem().phases[state.phase];
+    let (name, increments) = (phase.name.clone(), phase.increments);
+    observer.resumed(Some(&Place {
+        phase: name.clone(),
+        increment: state.increment(),
+    }));
+    let results = Recorder::resume(folder, wanted, about, simulation, checkpoint.results)?;
+    observer.phase(&name, increments);
+    simulation.go_to(state.into_owned())?;
+    Ok((results, checkpoint.warnings.into_owned()))
 }
 
 /// Records a simulation in its folder, and shows how it goes.
@@ -364,6 +355,25 @@ struct Follower<'a> {
 }
 
 impl Follower<'_> {
+    /// Carries the simulation out.
+    fn follow(&mut self, case: &Case, simulation: &mut Simulation) -> Result<(), Error> {
+        let outcome = simulation.run(self);
+        let (beyond, unreliable) = (simulation.beyond_theory(), self.results.unreliable());
+        for warning in beyond.iter().chain(&unreliable) {
+            self.say(warning);
+        }
+        let outcome = outcome.map_err(|error| {
+            if let mechanics::Error::NoEquilibrium(none) = &error
+                && let Some(plunge) = self.results.plunge(simulation.problem(), none)
+            {
+                self.observer.note(&plunge);
+            }
+            explained(case, simulation, error, self.fault.take(), &self.results)
+        });
+        self.tell_results(outcome.is_ok());
+        outcome
+    }
+
     fn say(&mut self, message: &str) {
         self.warnings.push(message.to_owned());
         self.observer.warning(message);
@@ -498,76 +508,6 @@ impl Watch for Follower<'_> {
     }
 }
 
-/// After a checkpoint a run goes on for this many times what it took: a large state is not written over and over.
-/// Not where one is wanted after every increment.
-const AT_LEAST: u32 = 20;
-
-/// Writes the checkpoints of a run.
-struct Keeper {
-    identity: String,
-    folder: PathBuf,
-    every: Option<Duration>,
-    /// It is absent at the end.
-    ends_without: bool,
-    last: Instant,
-    /// How long the last one took.
-    took: Duration,
-}
-
-impl Keeper {
-    /// Checkpoints in this folder.
-    fn new(identity: String, folder: &Path, options: Options) -> Self {
-        Self {
-            identity,
-            folder: folder.to_owned(),
-            every: options.checkpoints,
-            ends_without: options.ends_without,
-            last: Instant::now(),
-            took: Duration::ZERO,
-        }
-    }
-
-    /// Content of the folder's checkpoint, if it exists.
-    fn found(&self) -> Result<Option<Checkpoint<'static>>, text::Error> {
-        Checkpoint::read(&self.folder, &self.identity)
-    }
-
-    /// Whether it is time for another checkpoint.
-    fn is_due(&self) -> bool {
-        let pause = |every: Duration| match every {
-            Duration::ZERO => every,
-            _ => every.max(AT_LEAST * self.took),
-        };
-        self.every
-            .is_some_and(|every| self.last.elapsed() >= pause(every))
-    }
-
-    fn keep(
-        &mut self,
-        state: &State<'_>,
-        results: &Recorder,
-        warnings: &[String],
-    ) -> Result<(), text::Error> {
-        if self.every.is_some() {
-            let start = Instant::now();
-            let so_far = results.state()?;
-            Checkpoint::new(&self.identity, so_far, warnings, Some(state)).write(&self.folder)?;
-            self.last = Instant::now();
-            self.took = self.last - start;
-        }
-        Ok(())
-    }
-
-    /// The last checkpoint: there is nothing left to do.
-    fn end(&self, results: &Recorder, warnings: &[String]) -> Result<(), text::Error> {
-        if self.every.is_some() && !self.ends_without {
-            let so_far = results.state()?;
-            Checkpoint::new(&self.identity, so_far, warnings, None).write(&self.folder)?;
-        }
-        Ok(())
-    }
-}
-
 /// What must be the same for a study of a case to go on.
 pub(crate) fn identity_of(case: &Case) -> Result<String, Error> {
     let Posed {
@@ -598,111 +538,4 @@ fn identity(case: &Case, laws: &Laws, mesh: Option<&MeshFile>) -> String {
     let _ = writeln!(text, "{:?}", case.file.chosen);
     text += case.source.text();
     hexadecimal_sha256(text.as_bytes())
-}
-
-/// The error of a run with its place in the file, and what the user can do about it.
-fn explained(
-    case: &Case,
-    simulation: &Simulation,
-    error: mechanics::Error,
-    follower: &mut Follower<'_>,
-) -> Error {
-    if let mechanics::Error::NoEquilibrium(none) = &error
-        && let Some(plunge) = follower.results.plunge(simulation.problem(), none)
-    {
-        follower.observer.note(&plunge);
-    }
-    let kept = keep_capsule(case, simulation, &error, &follower.results);
-    let suspicion = || suspicion(simulation, &error);
-    let hint = match &kept {
-        Ok(kept) => kept.clone().or_else(suspicion),
-        Err(_) => None,
-    };
-    match (error, follower.fault.take(), kept) {
-        (mechanics::Error::Halted, Some(Fault::Overflow { probe, place }), _) => {
-            probes::overflow(case, &probe, &place)
-        }
-        (mechanics::Error::Halted, Some(Fault::File(error)), _) | (_, _, Err(error)) => {
-            error.into()
-        }
-        (error, _, Ok(_)) => {
-            let error = case.place(error);
-            match hint {
-                Some(hint) if error.kind() != Kind::Input => error.with_hint(&hint),
-                _ => error,
-            }
-        }
-    }
-}
-
-/// Writes the call of a law that failed for good. Returns what the user can do with it.
-fn keep_capsule(
-    case: &Case,
-    simulation: &Simulation,
-    error: &mechanics::Error,
-    results: &Recorder,
-) -> Result<Option<String>, text::Error> {
-    let (place, point): (&Place, &PointFailure) = match error {
-        mechanics::Error::Law { place, failure, .. } => (place, failure),
-        mechanics::Error::NoEquilibrium(none) => match none.failure.failed() {
-            Some(point) => (&none.place, point),
-            None => return Ok(None),
-        },
-        _ => return Ok(None),
-    };
-    let mut groups = simulation.groups().iter();
-    let group = groups.find(|group| group.name == point.group);
-    let number = |n: usize| toml::Value::from(n as i64);
-    let mut origin = vec![("case", case.source.path().display().to_string().into())];
-    origin.extend(case.variant.iter().map(|v| ("variant", v.as_str().into())));
-    origin.extend([
-        ("phase", place.phase.as_str().into()),
-        ("increment", number(place.increment)),
-        ("group", point.group.as_str().into()),
-        ("element", number(point.element)),
-        ("point", number(point.point)),
-        ("position", point.position.to_vec().into()),
-    ]);
-    let capsule = group.and_then(|group| Capsule::of(&group.law.built.law, &point.failure, origin));
-    let Some(capsule) = capsule else {
-        return Ok(None);
-    };
-    let file = results.folder().join(capsule::FILE_NAME);
-    capsule.write(&file).map_err(|error| match error {
-        law::Error::Text(error) => error,
-        other => text::Error::Internal(other.to_string()),
-    })?;
-    Ok(Some(format!(
-        "`pilum replay {}` repeats the call that failed",
-        file.display()
-    )))
-}
-
-/// Hint if a user's law may have prevented convergence: a wrong tangent does that.
-fn suspicion(simulation: &Simulation, error: &mechanics::Error) -> Option<String> {
-    let mechanics::Error::NoEquilibrium(none) = error else {
-        return None;
-    };
-    let asks_for_tangents = simulation.method() != Method::InitialStress;
-    let iterates = none.failure.failed().is_none() && !none.failure.iterations.is_empty();
-    let mut libraries: Vec<&Path> = simulation
-        .groups()
-        .iter()
-        .filter(|group| !group.is_linear())
-        .map(|group| group.law.built.law.library())
-        .filter(|library| library.foreign().is_none() && !library.is_beside_program())
-        .map(Library::path)
-        .collect();
-    libraries.sort_unstable();
-    libraries.dedup();
-    let checks = libraries
-        .iter()
-        .map(|library| format!("`pilum check {}`", library.display()));
-    let checks: Vec<String> = checks.collect();
-    (asks_for_tangents && iterates && !checks.is_empty()).then(|| {
-        format!(
-            "{} tells whether a wrong tangent is a cause",
-            checks.join(", ")
-        )
-    })
 }

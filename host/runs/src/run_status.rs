@@ -17,7 +17,7 @@ pub fn ending(error: Option<&Error>) -> Ending {
         Kind::Input | Kind::Internal => "stopped",
     };
     Ending {
-        status,
+        status: status.to_owned(),
         error: Some(error.to_string()),
         mechanism: error.mechanism().map(|mechanism| json!(mechanism)),
     }

@@ -2,39 +2,32 @@
 //!
 //! A study runs a driver or a case under many settings. It measures each against a reference that
 //! is finer than all of them, and reports how far the reference is converged. The command is
-//! [`run`]; [`reach`] goes the other way round and finds settings for a requested error.
+//! [`run`]; [`reach_until`] goes the other way round and finds settings for a requested error.
 
 mod accuracy;
 mod case_study;
-mod clock;
 mod diagram;
 mod division;
 mod driver_study;
 mod expected;
-mod page;
 mod pareto;
-mod progress;
-pub(crate) mod sampled;
 mod scheme;
+mod settings;
 mod stiffness;
 mod study;
 mod table;
-pub(crate) mod trial;
-mod trial_cache;
+mod trials;
 
-pub use accuracy::{reach, reach_until, run_accurately};
-pub use sampled::Convergence;
-pub use study::{Measurement, Reference, Row, Study};
+pub use accuracy::{reach_until, run_accurately};
 
 use crate::Error;
-use crate::run::identity_of;
-use crate::variants::{keep, of_variant};
+use crate::experiment::{Counts, write};
+use crate::variants::{folder, keep, of_variant};
 use input::{Case, Driver, is_driver};
 use law::{Opener, Stop};
 use std::path::{Path, PathBuf};
-use text::write::replace;
-use trial::Scratch;
-use trial_cache::Kept;
+use study::Study;
+use trials::Trials;
 
 /// Settings of a study.
 #[derive(Clone, Debug)]
@@ -74,32 +67,30 @@ pub fn run(
     show: &mut dyn FnMut(&str),
     say: &mut dyn FnMut(&str),
 ) -> Result<(), Error> {
+    let refused = |message: &str| Err(Error::usage(message));
     if options.most_increments == 0 {
-        let message = "--max-increments is 0, expected at least 1";
-        return Err(Error::usage(message.to_owned()));
+        return refused("--max-increments is 0, expected at least 1");
     }
     if options.resume && options.interface_stiffness {
-        let message = "--resume goes on with a study of settings, not with --interface-stiffness";
-        return Err(Error::usage(message.to_owned()));
+        return refused(
+            "--resume goes on with a study of settings, not with --interface-stiffness",
+        );
     }
     let path = if path.is_dir() {
         path.join("case.toml")
     } else {
         path.to_owned()
     };
-    if is_driver(&path)? {
-        if options.interface_stiffness {
-            let message = "--interface-stiffness needs a case: a driver has no elements beside it";
-            return Err(Error::usage(message.to_owned()));
-        }
-        if options.resume {
-            let message = "--resume needs a case: the study of a driver always starts anew";
-            return Err(Error::usage(message.to_owned()));
-        }
-        run_drivers(&path, options, show, say)
-    } else {
-        run_cases(&path, options, show, say)
+    if !is_driver(&path)? {
+        return run_cases(&path, options, show, say);
     }
+    if options.interface_stiffness {
+        return refused("--interface-stiffness needs a case: a driver has no elements beside it");
+    }
+    if options.resume {
+        return refused("--resume needs a case: the study of a driver always starts anew");
+    }
+    run_drivers(&path, options, show, say)
 }
 
 fn run_drivers(
@@ -117,10 +108,9 @@ fn run_drivers(
     let stem = stem.to_string_lossy().into_owned();
     let name = |driver: &Driver| driver.point().variant().map(str::to_owned);
     keep(&mut drivers, options.variant.as_deref(), name)?;
-    let folder = options.folder(&stem);
     for driver in &drivers {
         let name = options.full_name(&stem, driver.point().variant());
-        let place = options.place(&folder, driver.point().variant());
+        let place = options.folder(&stem, driver.point().variant());
         let mut study = Study::new(&name, driver.title(), driver_study::COUNTS);
         let mut done = |study: &Study| write_table(study, &place);
         let most = options.most_increments;
@@ -146,30 +136,28 @@ fn run_cases(
         let checked = crate::run::check(case);
         checked.map_err(|error| of_variant(error, case.variant.as_deref()))?;
     }
-    let folder = options.folder(&cases.first().map(Case::name).unwrap_or_default());
     for case in &cases {
         let name = options.full_name(&case.name(), case.variant.as_deref());
-        let place = options.place(&folder, case.variant.as_deref());
+        let place = options.folder(&case.name(), case.variant.as_deref());
         if options.interface_stiffness {
             let studied = stiffness::run(case, &name, (&place, &options.stop), show, say);
             studied.map_err(|error| of_variant(error, case.variant.as_deref()))?;
             continue;
         }
-        let kept = Kept::begin(&place, &identity_of(case)?, options.resume)?;
-        let scratch = Scratch::new(&place, &options.stop)?.keeping(kept);
-        if scratch.kept() > 0 {
-            say(&format!("{} trials are done already", scratch.kept()));
+        let trials = Trials::begin(case, &place, options.resume, &options.stop)?;
+        if trials.len() > 0 {
+            say(&format!("{} trials are done already", trials.len()));
         }
-        let mut study = Study::new(&name, &case.file.title, trial::COUNTS);
+        let mut study = Study::new(&name, &case.file.title, Counts::NAMES);
         let mut done = |study: &Study| write_table(study, &place);
         let extent = (options.fine, options.thorough);
-        let outcome = case_study::study(case, &mut study, extent, &scratch, (&mut done, say));
-        match scratch.kept() {
+        let outcome = case_study::study(&trials, &mut study, extent, (&mut done, say));
+        match trials.len() {
             kept if outcome.is_err() && kept > 0 => say(&format!(
                 "{kept} trials are kept in {}: --resume goes on from there",
                 place.display()
             )),
-            _ => scratch.end(),
+            _ => trials.end(),
         }
         let finished = finish(&mut study, &place, outcome, show);
         finished.map_err(|error| of_variant(error, case.variant.as_deref()))?;
@@ -185,17 +173,10 @@ impl Options {
         parts.collect::<Vec<_>>().join(", ")
     }
 
-    fn folder(&self, name: &str) -> PathBuf {
-        let default = || Path::new("results").join(format!("trade_off_{name}"));
-        self.out.clone().unwrap_or_else(default)
-    }
-
     /// The folder of one study: that of all, or one inside it for each variant.
-    fn place(&self, folder: &Path, variant: Option<&str>) -> PathBuf {
-        match variant {
-            Some(variant) if self.variant.is_none() => folder.join(variant),
-            _ => folder.to_owned(),
-        }
+    fn folder(&self, name: &str, variant: Option<&str>) -> PathBuf {
+        let name = format!("trade_off_{name}");
+        folder(self.out.as_deref(), &name, variant, self.variant.as_deref())
     }
 }
 
@@ -228,11 +209,5 @@ fn finish(
 /// Writes the rows that there are.
 fn write_table(study: &Study, folder: &Path) -> Result<(), Error> {
     std::fs::create_dir_all(folder).map_err(|source| text::Error::unwritable(folder, source))?;
-    let table = folder.join("trade_off.csv");
-    let written = study.write_csv(&table);
-    Ok(written.map_err(|error| text::Error::unwritable(&table, std::io::Error::other(error)))?)
-}
-
-fn write(path: &Path, text: &str) -> Result<(), Error> {
-    Ok(replace(path, text)?)
+    write(&folder.join("trade_off.csv"), &study.csv()?)
 }

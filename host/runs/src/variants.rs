@@ -1,6 +1,7 @@
 //! Selection among variants, for cases and drivers.
 
 use crate::Error;
+use std::path::{Path, PathBuf};
 use text::suggestion;
 
 /// Keeps the variant that is asked for; all, if none is.
@@ -29,5 +30,20 @@ pub fn of_variant(error: Error, variant: Option<&str>) -> Error {
     match variant {
         Some(name) => error.with_hint(&format!("this is variant `{name}`")),
         None => error,
+    }
+}
+
+/// Folder of results: `out`, or the one of this name under `results`; of one of several variants, none of which was
+/// chosen, a folder inside it.
+pub(crate) fn folder(
+    out: Option<&Path>,
+    name: &str,
+    variant: Option<&str>,
+    chosen: Option<&str>,
+) -> PathBuf {
+    let all = out.map_or_else(|| Path::new("results").join(name), Path::to_owned);
+    match variant {
+        Some(variant) if chosen.is_none() => all.join(variant),
+        _ => all,
     }
 }

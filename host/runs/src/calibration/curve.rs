@@ -1,14 +1,6 @@
 //! A measured curve, and the computed one next to it.
 
-/// Results along a path, in the stretches that a curve may choose from: segments of a driver, phases of a
-/// case.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Rows {
-    /// Names of the columns.
-    pub(super) names: Vec<String>,
-    /// Rows of each stretch.
-    pub(super) stretches: Vec<Vec<Vec<f64>>>,
-}
+use crate::experiment::Rows;
 
 /// A measured curve.
 #[derive(Clone, Debug)]
@@ -294,6 +286,7 @@ mod tests {
                 .iter()
                 .map(|s| s.iter().map(row).collect())
                 .collect(),
+            ..Rows::default()
         }
     }
 

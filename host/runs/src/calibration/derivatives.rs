@@ -1,10 +1,9 @@
 //! Derivatives of what tests compute by parameters, as the search counts.
 
-use super::curve::Rows;
-use super::model::{Computed, Model, Subject};
+use super::model::{Model, Subject};
 use super::rates;
 use crate::Error;
-use input::material::ParameterValue;
+use crate::experiment::Rows;
 use results::point_figure::drawable;
 
 /// Sides from which differences are taken.
@@ -93,15 +92,10 @@ impl Model {
             return Ok(None);
         }
         self.stop.check("the calibration")?;
-        let key = self.key(test, counted, parameters.to_vec());
-        let columns: Computed<Vec<Vec<f64>>> = if let Some(columns) = self.kept.find(&key) {
-            columns.clone()
-        } else {
-            let columns = self.followed(test, counted, parameters);
-            let columns = columns.ok_or_else(|| "no rates".to_owned());
-            self.kept.keep(key, columns.clone())?;
-            columns
-        };
+        let columns = self.once(test, counted, parameters, |model| {
+            let columns = model.followed(test, counted, parameters);
+            Ok(columns.ok_or_else(|| "no rates".to_owned()))
+        })?;
         // What is kept depends neither on noise and weights, nor on how parameters are counted.
         let of_test = &self.tests[test];
         let values = self.values(counted);
@@ -130,17 +124,11 @@ impl Model {
         counted: &[f64],
         parameters: &[usize],
     ) -> Option<Vec<Vec<f64>>> {
-        let Subject::Driver(driver) = &self.tests[test].subject else {
-            return None;
-        };
         let values = self.values(counted);
-        let targets = &self.tests[test].targets;
-        let set = targets
-            .iter()
-            .map(|(p, _, id)| (id.clone(), ParameterValue::Number(values[*p])));
-        let Ok(driver) = driver.with_parameters(&set.collect::<Vec<_>>()) else {
+        let Ok(Subject::Driver(driver)) = self.tests[test].with(&values) else {
             return None;
         };
+        let targets = &self.tests[test].targets;
         let declared = &driver.point().law().description().parameters;
         let number = |parameter: usize| {
             let (.., id) = targets.iter().find(|(p, ..)| *p == parameter)?;
@@ -153,6 +141,7 @@ impl Model {
         let rows = Rows {
             names: drawable(driver.point()),
             stretches: followed.stretches,
+            ..Rows::default()
         };
         let mut of_own = followed.derivatives.into_iter();
         let mut columns = Vec::new();

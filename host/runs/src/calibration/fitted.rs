@@ -1,11 +1,12 @@
 //! Curves computed with the values found, and the measured ones.
 
 use super::curve::Curve;
-use super::fit::{Group, Stage, Wish, known_to};
+use super::fit::Wish;
 use super::misfit;
 use super::model::{Model, Test};
 use super::profile::Side;
 use super::propagation::{Errors, Known};
+use super::stage::{Group, Stage, known_to, last_stage};
 use super::statistics::{of_neighbours, two_sided};
 use super::systematic::{Limits, Systematic};
 use crate::Error;
@@ -255,6 +256,20 @@ fn scatter(
     })
 }
 
+/// Names of parameters.
+fn names(model: &Model, parameters: &[usize]) -> String {
+    let names = parameters
+        .iter()
+        .map(|&p| format!("`{}`", model.parameters[p].name));
+    names.collect::<Vec<_>>().join(" and ")
+}
+
+/// Whether a prediction changes by more than a part of its deviation where a parameter changes by so much.
+fn counts(gradient: Option<&Vec<f64>>, change: f64, deviations: &[Option<f64>]) -> bool {
+    let mut pairs = gradient.into_iter().flatten().zip(deviations);
+    pairs.any(|(g, d)| d.is_some_and(|d| (g * change).abs() > COUNTS * d))
+}
+
 /// Curves with points whose prediction depends on what is not determined.
 fn without_interval(model: &Model, test: &Test, known: &[Known]) -> Vec<String> {
     let word = |(curve, known): (&Curve, &[Known])| {
@@ -266,10 +281,6 @@ fn without_interval(model: &Model, test: &Test, known: &[Known]) -> Vec<String> 
         let n = open.inspect(|of| parameters.extend(*of)).count();
         parameters.sort_unstable();
         parameters.dedup();
-        let names = parameters
-            .iter()
-            .map(|&p| format!("`{}`", model.parameters[p].name));
-        let names: Vec<String> = names.collect();
         (n > 0).then(|| {
             format!(
                 "{}, {}: {n} of {} points have no interval of prediction: what is computed there depends on {}, which \
@@ -277,7 +288,7 @@ fn without_interval(model: &Model, test: &Test, known: &[Known]) -> Vec<String> 
                 test.name,
                 curve.y,
                 known.len(),
-                names.join(" and ")
+                names(model, &parameters)
             )
         })
     };
@@ -293,34 +304,25 @@ fn without_limit(
     (of, gradients): (&[usize], &[Option<Vec<f64>>]),
     deviations: &[Option<f64>],
 ) -> Option<String> {
-    let counts = |(&parameter, gradient): (&usize, &Option<Vec<f64>>)| {
-        let last = stages.iter().rev().find_map(|stage| {
-            let place = stage
-                .group
-                .parameters
-                .iter()
-                .position(|&p| p == parameter)?;
-            Some((stage, place))
-        });
-        let (stage, place) = last?;
-        let profile = stage.profiles.get(place).filter(|p| p.points.len() > 1)?;
-        let is_open = profile
-            .sides
-            .iter()
-            .any(|side| !matches!(side, Side::Limit(_)));
-        let error = stage.error(place).filter(|_| is_open)?;
-        let gradient = gradient.as_ref()?;
-        let mut pairs = gradient.iter().zip(deviations);
-        let does = pairs.any(|(g, d)| d.is_some_and(|d| (g * error).abs() > COUNTS * d));
-        does.then(|| format!("`{}`", model.parameters[parameter].name))
+    let error = |parameter: usize| {
+        let (stage, place) = last_stage(stages, parameter)?;
+        let profile = stages[stage].profiles.get(place)?;
+        let mut sides = profile.sides.iter();
+        let is_open = sides.any(|side| !matches!(side, Side::Limit(_)));
+        let error = stages[stage].error(place)?;
+        (profile.points.len() > 1 && is_open).then_some(error)
     };
-    let names: Vec<String> = of.iter().zip(gradients).filter_map(counts).collect();
-    (test.is_predicted && !names.is_empty()).then(|| {
+    let named = of.iter().zip(gradients).filter(|(parameter, gradient)| {
+        let error = error(**parameter);
+        error.is_some_and(|error| counts(gradient.as_ref(), error, deviations))
+    });
+    let named: Vec<usize> = named.map(|(parameter, _)| *parameter).collect();
+    (test.is_predicted && !named.is_empty()).then(|| {
         format!(
             "{}: what is computed depends on {}, which has an interval without an end: the interval of prediction, from \
              the covariance alone, is too narrow",
             test.name,
-            names.join(" and ")
+            names(model, &named)
         )
     })
 }
@@ -328,12 +330,8 @@ fn without_limit(
 /// Parameters that ended on a bound, where a test is predicted.
 fn on_bounds(model: &Model, stages: &[Stage], test: usize) -> Vec<usize> {
     let is_on_bound = |parameter: &usize| {
-        let mut last = stages.iter().rev().filter_map(|stage| {
-            let mut own = stage.group.parameters.iter();
-            let place = own.position(|p| p == parameter)?;
-            Some(stage.on_bound[place] != [false, false])
-        });
-        last.next().unwrap_or(false)
+        let last = last_stage(stages, *parameter);
+        last.is_some_and(|(stage, place)| stages[stage].on_bound[place] != [false, false])
     };
     let all = (0..model.parameters.len()).filter(|_| model.tests[test].is_predicted);
     all.filter(is_on_bound).collect()
@@ -346,20 +344,17 @@ fn on_a_bound(
     (held, gradients): (&[usize], &[Option<Vec<f64>>]),
     deviations: &[Option<f64>],
 ) -> Option<String> {
-    let counts = |(&parameter, gradient): (&usize, &Option<Vec<f64>>)| {
-        let [low, high] = model.parameters[parameter].counted_range();
-        let gradient = gradient.as_ref()?;
-        let mut pairs = gradient.iter().zip(deviations);
-        let does = pairs.any(|(g, d)| d.is_some_and(|d| (g * (high - low)).abs() > COUNTS * d));
-        does.then(|| format!("`{}`", model.parameters[parameter].name))
-    };
-    let names: Vec<String> = held.iter().zip(gradients).filter_map(counts).collect();
-    (!names.is_empty()).then(|| {
+    let named = held.iter().zip(gradients).filter(|(parameter, gradient)| {
+        let [low, high] = model.parameters[**parameter].counted_range();
+        counts(gradient.as_ref(), high - low, deviations)
+    });
+    let named: Vec<usize> = named.map(|(parameter, _)| *parameter).collect();
+    (!named.is_empty()).then(|| {
         format!(
             "{}: what is computed depends on {}, which ended on a bound: the interval of prediction takes the bound for a \
              value that is known, and may be too narrow",
             test.name,
-            names.join(" and ")
+            names(model, &named)
         )
     })
 }

@@ -50,20 +50,6 @@ pub(super) struct Settings {
     pub(super) longest: f64,
 }
 
-impl Default for Settings {
-    /// For residuals that are known to round-off.
-    fn default() -> Self {
-        Self {
-            reduction: 1e-22,
-            step: 1e-12,
-            gradient: 1e-12,
-            least: 0.0,
-            iterations: 200,
-            longest: f64::INFINITY,
-        }
-    }
-}
-
 /// How a fit ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
@@ -290,6 +276,20 @@ fn step(
 mod tests {
     use super::*;
     use crate::calibration::statistics::Covariance;
+
+    impl Default for Settings {
+        /// For residuals that are known to round-off.
+        fn default() -> Self {
+            Self {
+                reduction: 1e-22,
+                step: 1e-12,
+                gradient: 1e-12,
+                least: 0.0,
+                iterations: 200,
+                longest: f64::INFINITY,
+            }
+        }
+    }
 
     /// A model y = f(x; b) with its derivatives, fitted to points.
     struct Curve {

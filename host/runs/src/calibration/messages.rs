@@ -1,14 +1,14 @@
 //! Notes of a calibration: undetermined parameters and the reasons.
 
 use super::coordinates::Parameter;
-use super::curve::Rows;
-use super::fit::Stage;
 use super::least_squares::End;
 use super::misfit;
 use super::model::{Model, Subject};
 use super::profile::Side;
 use super::propagation::Errors;
+use super::stage::Stage;
 use crate::Error;
+use crate::experiment::{Rows, digits};
 use input::calibration::{Scale, Variance};
 
 /// Correlation beyond which two parameters are reported to be told together only.
@@ -22,10 +22,6 @@ const PART: f64 = 0.1;
 ///
 /// # Errors
 /// Stopped.
-#[expect(
-    clippy::too_many_lines,
-    reason = "one paragraph for each thing to be said"
-)]
 pub(super) fn of_stage(
     model: &mut Model,
     stage: &Stage,
@@ -33,12 +29,8 @@ pub(super) fn of_stage(
     variance: Variance,
 ) -> Result<Vec<String>, Error> {
     let mut words = Vec::new();
-    let group = stage.group.clone();
-    let parameters: Vec<Parameter> = group
-        .parameters
-        .iter()
-        .map(|&p| model.parameters[p].clone())
-        .collect();
+    let own = stage.group.parameters.iter();
+    let parameters: Vec<Parameter> = own.map(|&p| model.parameters[p].clone()).collect();
     if stage.is_exact && variance == Variance::Estimated {
         words.push(
             "the residuals are smaller than what computed values are known to, as those of points that the law itself has \
@@ -47,31 +39,11 @@ pub(super) fn of_stage(
         );
     }
     let is_bad = is_bad(model, stage);
-    match stage.end {
-        End::Converged => {}
-        End::Exhausted => words.push(
-            "the search was given up after as many iterations as are allowed: these are not the best values".to_owned(),
-        ),
-        End::Barred => words.push(
-            "the search ends at values beyond which a test cannot be computed: the best ones may lie there; another \
-             `start`, or `min` and `max` that keep what the law refuses out"
-                .to_owned(),
-        ),
-        End::NoDerivatives => words.push(
-            "at the values found a small change of a parameter leads to tests that cannot be computed: the search ends \
-             there"
-            .to_owned(),
-        ),
-        End::Stalled => words.push(
-            "the search ends where no step, however short, makes the sum of squares smaller: computed curves have a \
-             kink there, or are not exact enough (more increments, tighter tolerances, another `difference`)"
-            .to_owned(),
-        ),
-    }
+    words.extend(of_end(stage.end).map(str::to_owned));
     for (place, parameter) in parameters.iter().enumerate() {
         if !stage.seen[place] {
-            let asked = (parameter, group.parameters[place]);
-            words.push(unseen(model, &group.tests, asked, values, is_bad)?);
+            let asked = (parameter, stage.group.parameters[place]);
+            words.push(unseen(model, &stage.group.tests, asked, values, is_bad)?);
             continue;
         }
         match stage.on_bound[place] {
@@ -80,6 +52,54 @@ pub(super) fn of_stage(
             _ => {}
         }
     }
+    of_directions(stage, &parameters, &mut words);
+    for (place, parameter) in parameters.iter().enumerate() {
+        if stage.seen[place] {
+            of_interval(stage, place, parameter, &mut words);
+        }
+    }
+    of_optima(stage, &parameters, &mut words);
+    if stage.failures > 0 {
+        let why = model.first_failure.as_deref();
+        words.push(format!(
+            "{} steps of the search were shortened because a test could not be computed, such as: {}",
+            stage.failures,
+            why.unwrap_or("a curve ends too early")
+        ));
+    }
+    words.extend(of_noise(model, stage, variance));
+    if stage.degrees == 0 {
+        words.push(
+            "there are no more measured points than parameters: nothing is left to tell how exact they are".to_owned(),
+        );
+    }
+    Ok(words)
+}
+
+/// How the search ended, if not at the best values.
+fn of_end(end: End) -> Option<&'static str> {
+    match end {
+        End::Converged => None,
+        End::Exhausted => Some(
+            "the search was given up after as many iterations as are allowed: these are not the best values",
+        ),
+        End::Barred => Some(
+            "the search ends at values beyond which a test cannot be computed: the best ones may lie there; another \
+             `start`, or `min` and `max` that keep what the law refuses out",
+        ),
+        End::NoDerivatives => Some(
+            "at the values found a small change of a parameter leads to tests that cannot be computed: the search ends \
+             there",
+        ),
+        End::Stalled => Some(
+            "the search ends where no step, however short, makes the sum of squares smaller: computed curves have a \
+             kink there, or are not exact enough (more increments, tighter tolerances, another `difference`)",
+        ),
+    }
+}
+
+/// Parameters that only count together, or nearly so.
+fn of_directions(stage: &Stage, parameters: &[Parameter], words: &mut Vec<String>) {
     for direction in &stage.covariance.blind {
         let places = stage.covariance.variables.iter().zip(direction);
         let parts: Vec<(&Parameter, f64)> = places
@@ -92,88 +112,83 @@ pub(super) fn of_stage(
     }
     for a in 0..parameters.len() {
         for b in 0..a {
-            if let Some(rho) = stage
-                .covariance
-                .correlation(a, b)
-                .filter(|r| r.abs() > CORRELATED)
-            {
-                let how = if rho > 0.0 {
-                    "rise together"
-                } else {
-                    "one rises as the other falls"
-                };
-                words.push(format!(
-                    "`{}` and `{}` are told together rather than each (correlation {rho:.3}): {how} with hardly any \
-                     change of the curves; fix one of them, or add a test that parts them",
-                    parameters[b].name, parameters[a].name
-                ));
-            }
-        }
-    }
-    for (place, parameter) in parameters.iter().enumerate() {
-        if !stage.seen[place] {
-            continue;
-        }
-        if let Some(profile) = stage.profiles.get(place).filter(|p| p.points.len() > 1) {
-            let sides = profile.sides.into_iter().zip(stage.on_bound[place]);
-            let open = sides.enumerate().filter(|(_, (_, on_bound))| !on_bound);
-            words.extend(open.filter_map(|(number, (side, _))| open_side(parameter, number, side)));
-        }
-        let Some(error) = stage.error(place) else {
-            continue;
-        };
-        let half = stage.quantile * error;
-        let is_wide = match parameter.scale {
-            Scale::Log => 2.0 * half > WIDE_FACTOR.ln(),
-            // No offset at all is as good an answer as any.
-            Scale::Linear if parameter.of_curve.is_some() => false,
-            Scale::Linear => {
-                let value = parameter.value(stage.best[place]);
-                half * parameter.slope(value) > value.abs()
-            }
-        };
-        if is_wide && half.is_finite() {
-            let [low, high] = [-half, half].map(|d| digits(parameter.value(stage.best[place] + d)));
+            let correlation = stage.covariance.correlation(a, b);
+            let Some(rho) = correlation.filter(|r| r.abs() > CORRELATED) else {
+                continue;
+            };
+            let how = if rho > 0.0 {
+                "rise together"
+            } else {
+                "one rises as the other falls"
+            };
             words.push(format!(
-                "`{}` is told poorly: {low} to {high}",
-                parameter.name
+                "`{}` and `{}` are told together rather than each (correlation {rho:.3}): {how} with hardly any \
+                 change of the curves; fix one of them, or add a test that parts them",
+                parameters[b].name, parameters[a].name
             ));
         }
     }
-    let others: Vec<_> = stage.optima.iter().skip(1).collect();
-    for optimum in others.iter().filter(|optimum| optimum.is_as_good) {
+}
+
+/// An interval of a parameter that is open, or wide.
+fn of_interval(stage: &Stage, place: usize, parameter: &Parameter, words: &mut Vec<String>) {
+    if let Some(profile) = stage.profiles.get(place).filter(|p| p.points.len() > 1) {
+        let sides = profile.sides.into_iter().zip(stage.on_bound[place]);
+        let open = sides.enumerate().filter(|(_, (_, on_bound))| !on_bound);
+        words.extend(open.filter_map(|(number, (side, _))| open_side(parameter, number, side)));
+    }
+    let Some(error) = stage.error(place) else {
+        return;
+    };
+    let half = stage.quantile * error;
+    let is_wide = match parameter.scale {
+        Scale::Log => 2.0 * half > WIDE_FACTOR.ln(),
+        // No offset at all is as good an answer as any.
+        Scale::Linear if parameter.of_curve.is_some() => false,
+        Scale::Linear => {
+            let value = parameter.value(stage.best[place]);
+            half * parameter.slope(value) > value.abs()
+        }
+    };
+    if is_wide && half.is_finite() {
+        let [low, high] = [-half, half].map(|d| digits(parameter.value(stage.best[place] + d)));
+        words.push(format!(
+            "`{}` is told poorly: {low} to {high}",
+            parameter.name
+        ));
+    }
+}
+
+/// Other optima, and starts that led nowhere.
+fn of_optima(stage: &Stage, parameters: &[Parameter], words: &mut Vec<String>) {
+    let others = stage.optima.iter().skip(1);
+    let (as_good, worse): (Vec<_>, Vec<_>) = others.partition(|optimum| optimum.is_as_good);
+    for optimum in as_good {
         words.push(format!(
             "another set of values fits as well (sum of squares {} against {}): {}; what parts the two is not in these \
              tests",
             digits(optimum.sum),
             digits(stage.sum),
-            list(&parameters, &optimum.u)
+            list(parameters, &optimum.u)
         ));
     }
-    let nowhere = stage
-        .landings
-        .iter()
-        .filter(|landing| landing.to.is_none())
-        .count();
-    let worse: Vec<_> = others
-        .iter()
-        .filter(|optimum| !optimum.is_as_good)
-        .collect();
+    let n = stage.landings.len();
+    let landings = stage.landings.iter();
+    let nowhere = landings.filter(|landing| landing.to.is_none()).count();
     if let Some(first) = worse.first() {
         words.push(format!(
             "of {} starts {} led to worse optima, such as {} (sum of squares {} against {})",
-            stage.landings.len() - nowhere,
+            n - nowhere,
             worse.iter().map(|optimum| optimum.times).sum::<usize>(),
-            list(&parameters, &first.u),
+            list(parameters, &first.u),
             digits(first.sum),
             digits(stage.sum)
         ));
     }
-    if 2 * nowhere > stage.landings.len() {
+    if 2 * nowhere > n {
         words.push(format!(
-            "{nowhere} of {} places that the search was to start from are values with which a test cannot be computed: \
-             `min` and `max` nearer to each other would spare them",
-            stage.landings.len()
+            "{nowhere} of {n} places that the search was to start from are values with which a test cannot be computed: \
+             `min` and `max` nearer to each other would spare them"
         ));
     }
     if stage.is_renewed {
@@ -182,48 +197,28 @@ pub(super) fn of_stage(
                 .to_owned(),
         );
     }
-    if stage.failures > 0 {
-        let why = model
-            .first_failure
-            .clone()
-            .unwrap_or_else(|| "a curve ends too early".to_owned());
-        words.push(format!(
-            "{} steps of the search were shortened because a test could not be computed, such as: {why}",
-            stage.failures
-        ));
+}
+
+/// Residuals of another size than the noise that is given.
+fn of_noise(model: &Model, stage: &Stage, variance: Variance) -> Option<String> {
+    let tests = stage.group.tests.iter();
+    let mut curves = tests.flat_map(|&test| &model.tests[test].curves);
+    let is_given = variance == Variance::Given || curves.all(|curve| curve.is_noise_given);
+    if !is_given || stage.degrees == 0 {
+        return None;
     }
-    let curves = |test: &usize| model.tests[*test].curves.iter();
-    let is_given = variance == Variance::Given
-        || group
-            .tests
-            .iter()
-            .flat_map(curves)
-            .all(|c| c.is_noise_given);
-    if is_given && stage.degrees > 0 {
-        let ratio = (stage.plain_sum / stage.degrees as f64).sqrt();
+    let ratio = (stage.plain_sum / stage.degrees as f64).sqrt();
+    let (least, believed) = match variance {
+        Variance::Given => (0.5, "the intervals believe the noise"),
         // Where only proportions are believed, a file may well give too much.
-        let least = if variance == Variance::Given {
-            0.5
-        } else {
-            0.0
-        };
-        if !(least..=2.0).contains(&ratio) {
-            let believed = match variance {
-                Variance::Given => "the intervals believe the noise",
-                Variance::Estimated => "the intervals take all of them for noise",
-            };
-            words.push(format!(
-                "residuals are {ratio:.2} times the noise that is given: either that is not the noise, or the law does \
-                 not follow the tests; {believed}"
-            ));
-        }
-    }
-    if stage.degrees == 0 {
-        words.push(
-            "there are no more measured points than parameters: nothing is left to tell how exact they are".to_owned(),
-        );
-    }
-    Ok(words)
+        Variance::Estimated => (0.0, "the intervals take all of them for noise"),
+    };
+    (!(least..=2.0).contains(&ratio)).then(|| {
+        format!(
+            "residuals are {ratio:.2} times the noise that is given: either that is not the noise, or the law does \
+             not follow the tests; {believed}"
+        )
+    })
 }
 
 /// Ratio of two standard errors that is worth a word.
@@ -553,33 +548,16 @@ fn facts(model: &Model, tests: &[(usize, Rows)]) -> Vec<String> {
     facts
 }
 
-/// A number with six digits.
-pub(super) fn digits(value: f64) -> String {
-    let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
-    if rounded == 0.0 || (1e-4..1e7).contains(&rounded.abs()) {
-        format!("{rounded}")
-    } else {
-        format!("{rounded:e}")
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn numbers_have_six_digits() {
-        assert_eq!(digits(0.780_123_456), "0.780123");
-        assert_eq!(digits(86_000.0), "86000");
-        assert_eq!(digits(4.500_000_1e-5), "4.5e-5");
-        assert_eq!(digits(0.0), "0");
-    }
 
     #[test]
     fn columns_that_move_are_named() {
         let rows = |t: f64| Rows {
             names: vec!["u".to_owned(), "t".to_owned()],
             stretches: vec![vec![vec![0.0, 0.0], vec![1.0, t]]],
+            ..Rows::default()
         };
         assert_eq!(changes(&rows(2.0), &rows(2.1)), ["t"]);
         assert!(changes(&rows(2.0), &rows(2.0)).is_empty());

@@ -1,7 +1,7 @@
 //! Bad fits: residuals as large as the measured values, and possible reasons.
 
 use super::curve::Curve;
-use super::messages::digits;
+use crate::experiment::digits;
 
 /// A fit is bad if the root mean square of residuals exceeds this part of the largest measured value;
 /// `RATHER_BAD` if the computed curve explains less than half of the variation of the measured one.

@@ -1,15 +1,15 @@
 //! The tests of a calibration, computed for values of its parameters.
 
-use super::cache::{Kept, Key};
 use super::coordinates::Parameter;
-use super::curve::{Curve, Gap, Rows};
+use super::curve::{Curve, Gap};
 use crate::Error;
+use crate::experiment::{Earlier, Kept, Rows, Scratch, Timing, bits, measure};
 use crate::run::identity_of;
-use crate::trade_off::trial::{Scratch, Timing, measure};
 use input::material::{ParameterValue, set_parameters};
 use input::{Case, Driver, Kind};
 use law::{Stop, hexadecimal_sha256};
 use results::point_figure::{drawable, drawn};
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -23,7 +23,7 @@ pub(super) struct Model {
     pub(super) difference: f64,
     pub(super) stop: Stop,
     /// What was computed.
-    pub(super) kept: Kept,
+    pub(super) kept: Kept<Key, Columns>,
     /// Why the first computation that came to no result did not.
     pub(super) first_failure: Option<String>,
     /// Points that are left out.
@@ -35,6 +35,30 @@ pub(super) struct Model {
 
 /// Number of these that are kept.
 const OF_LATE: usize = 32;
+
+/// The file of what was computed, in the folder of a calibration, and what is done there. The search takes the same way
+/// every time: with what each computation came to, the same command takes it for nothing as far as it went before.
+const FILE: (&str, &str) = ("computations.jsonl", "calibrates");
+
+/// What was computed of a test: values at its measured points, or their derivatives by the values of some parameters.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub(super) struct Key {
+    test: usize,
+    /// Values of its parameters, by their bits.
+    at: Vec<u64>,
+    /// The parameters that derivatives are by; none of values.
+    by: Vec<usize>,
+}
+
+/// A column of values for each parameter, one of values; or why none exist.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Columns(#[serde(with = "bits")] Computed<Vec<Vec<f64>>>);
+
+/// Removes the file of what was computed: the calibration has come to its end.
+pub(super) fn forget(folder: &Path) {
+    // What cannot be removed is taken over by the next call, which finds the same with it.
+    let _ = std::fs::remove_file(folder.join(FILE.0));
+}
 
 /// A test.
 #[derive(Debug)]
@@ -75,24 +99,43 @@ impl Model {
         counted: &[f64],
     ) -> Result<Computed<Vec<f64>>, Error> {
         self.stop.check("the calibration")?;
-        let key = self.key(test, counted, Vec::new());
-        let columns = if let Some(columns) = self.kept.find(&key) {
-            columns.clone()
-        } else {
-            let rows = self.rows_for_readings(test, counted)?;
-            let columns = rows.and_then(|rows| {
-                let values = self.tests[test].computed(&rows, &self.values(counted));
+        let columns = self.once(test, counted, &[], |model| {
+            let rows = model.rows_for_readings(test, counted)?;
+            Ok(rows.and_then(|rows| {
+                let values = model.tests[test].computed(&rows, &model.values(counted));
                 values
                     .map(|values| vec![values])
                     .map_err(|_| "a curve ends before its last measured point".to_owned())
-            });
-            self.kept.keep(key, columns.clone())?;
-            columns
-        };
+            }))
+        })?;
         if let Err(why) = &columns {
             self.first_failure.get_or_insert_with(|| why.clone());
         }
         Ok(columns.map(|columns| columns.concat()))
+    }
+
+    /// Computes something of a test at a place of the search, unless that was done before: values, or derivatives `by`
+    /// parameters.
+    pub(super) fn once(
+        &mut self,
+        test: usize,
+        counted: &[f64],
+        by: &[usize],
+        compute: impl FnOnce(&mut Self) -> Result<Computed<Vec<Vec<f64>>>, Error>,
+    ) -> Result<Computed<Vec<Vec<f64>>>, Error> {
+        let values = self.values(counted).into_iter().enumerate();
+        let own = values.filter(|(parameter, _)| self.tests[test].has(*parameter));
+        let key = Key {
+            test,
+            at: own.map(|(_, value)| value.to_bits()).collect(),
+            by: by.to_vec(),
+        };
+        if let Some(Columns(found)) = self.kept.find(&key) {
+            return Ok(found.clone());
+        }
+        let columns = compute(self)?;
+        self.kept.keep(key, Columns(columns.clone()))?;
+        Ok(columns)
     }
 
     /// As [`Self::rows`], which takes no account of how curves are read.
@@ -152,24 +195,18 @@ impl Model {
         (self.exactness_of(tests) / self.difference).max(1e-6)
     }
 
-    /// Key of a stored result: the test, with the values of the parameters that influence it.
-    pub(super) fn key(&self, test: usize, counted: &[f64], by: Vec<usize>) -> Key {
-        let values = self.values(counted).into_iter().enumerate();
-        let own = values.filter(|(parameter, _)| self.tests[test].has(*parameter));
-        Key {
-            test,
-            at: own.map(|(_, value)| value.to_bits()).collect(),
-            by,
-        }
-    }
-
     /// Keeps what is computed in a folder, and takes over what an earlier call has kept there.
     ///
     /// # Errors
     /// Another process calibrates there; files that cannot be read or written.
     pub(super) fn keep_in(&mut self, folder: &Path, anew: bool) -> Result<(), Error> {
-        let identity = self.identity()?;
-        self.kept.in_folder(folder, &identity, anew)
+        let earlier = if anew {
+            Earlier::Forget
+        } else {
+            Earlier::TakeOver
+        };
+        self.kept = Kept::in_folder(folder, FILE, &self.identity()?, earlier)?;
+        Ok(())
     }
 
     /// Dependencies of all computations: program, files, libraries, abscissas of the curves,
@@ -232,36 +269,58 @@ pub(super) fn words(error: &Error) -> String {
         .to_owned()
 }
 
+/// A value of a parameter: table of laws (none for a driver), id, value.
+pub(super) type Setting = (Option<String>, String, ParameterValue);
+
+impl Subject {
+    /// The same with other values of some parameters.
+    ///
+    /// # Errors
+    /// Those of building the law of a driver.
+    pub(super) fn with(&self, settings: Vec<Setting>) -> Result<Self, Error> {
+        match self {
+            Self::Driver(driver) => {
+                let settings = settings.into_iter().map(|(_, id, value)| (id, value));
+                let driver = driver.with_parameters(&settings.collect::<Vec<_>>())?;
+                Ok(Self::Driver(Box::new(driver)))
+            }
+            Self::Case(case) => {
+                let mut case = case.clone();
+                for (table, id, value) in settings {
+                    let laws = case.file.laws.iter_mut();
+                    let mut laws = laws.filter(|(key, _)| Some(key.get_ref()) == table.as_ref());
+                    if let Some((_, law)) = laws.next() {
+                        set_parameters(&mut law.get_mut().parameters, &[(id, value)]);
+                    }
+                }
+                Ok(Self::Case(case))
+            }
+        }
+    }
+}
+
 impl Test {
+    /// The subject with these values of the parameters.
+    ///
+    /// # Errors
+    /// As [`Subject::with`].
+    pub(super) fn with(&self, values: &[f64]) -> Result<Subject, Error> {
+        let targets = self.targets.iter();
+        let settings = targets.map(|(parameter, table, id)| {
+            let value = ParameterValue::Number(values[*parameter]);
+            (table.clone(), id.clone(), value)
+        });
+        self.subject.with(settings.collect())
+    }
+
     /// What the test computes with these values of the parameters.
     fn rows(&self, values: &[f64], scratch: &Scratch, stop: &Stop) -> Result<Rows, Error> {
-        let number = |value: f64| ParameterValue::Number(value);
-        match &self.subject {
-            Subject::Driver(driver) => {
-                let set = self.targets.iter();
-                let set: Vec<_> = set
-                    .map(|(p, _, id)| (id.clone(), number(values[*p])))
-                    .collect();
-                let mut driver = driver.with_parameters(&set)?;
+        match self.with(values)? {
+            Subject::Driver(mut driver) => {
                 driver.point_mut().stop_on(stop);
                 rows_of(&driver)
             }
-            Subject::Case(case) => {
-                let mut case = case.clone();
-                for (parameter, table, id) in &self.targets {
-                    let set = [(id.clone(), number(values[*parameter]))];
-                    for (key, law) in &mut case.file.laws {
-                        if Some(key.get_ref()) == table.as_ref() {
-                            set_parameters(&mut law.get_mut().parameters, &set);
-                        }
-                    }
-                }
-                let trial = measure(&mut case, scratch, Timing::Once, &scratch.stop)?;
-                Ok(Rows {
-                    names: trial.rows.names,
-                    stretches: trial.rows.stretches,
-                })
-            }
+            Subject::Case(case) => Ok(measure(*case, scratch, Timing::Once)?.rows),
         }
     }
 
@@ -341,5 +400,6 @@ fn rows_of(driver: &Driver) -> Result<Rows, Error> {
     Ok(Rows {
         names: drawable(driver.point()),
         stretches,
+        ..Rows::default()
     })
 }

@@ -1,15 +1,16 @@
 //! What a calibration leaves in its folder, and what it shows.
 
-use super::curve::Curve;
-use super::messages::digits;
-use super::{Interval, Open, Outcome, figures, page};
+use super::figures::{self, Drawn};
+use super::{FittedCurve, Interval, Open, Outcome, Stage};
 use crate::Error;
+use crate::experiment::{csv, digits, page, write as put};
 use input::calibration::{Calibration, Scale, Variance};
+use minijinja::value::Serde;
+use minijinja::{Value as Template, context};
 use results::number;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
-use text::write::replace;
 
 /// Writes all files of a calibration.
 ///
@@ -28,19 +29,49 @@ pub(super) fn write(
     all["figures"] = names.map(|(name, _)| name.clone()).collect();
     let json = serde_json::to_string_pretty(&all);
     let json = json.map_err(|error| Error::internal(error.to_string()))?;
-    let put = |name: &str, text: String| replace(&folder.join(name), text);
-    put("calibration.json", json + "\n")?;
-    put("parameters.toml", outcome.block.clone())?;
-    put("parameters.csv", parameters(outcome))?;
-    put("correlations.csv", correlations(outcome))?;
-    put("fit.csv", fit(outcome))?;
-    put("starts.csv", starts(outcome))?;
-    put("profiles.csv", profiles(outcome))?;
-    put(
-        "report.html",
-        page::render(outcome, calibration, &drawn, folder)?,
-    )?;
-    Ok(())
+    let files = [
+        ("calibration.json", json + "\n"),
+        ("parameters.toml", outcome.block.clone()),
+        ("parameters.csv", parameters(outcome)?),
+        ("correlations.csv", correlations(outcome)?),
+        ("fit.csv", fit(outcome)?),
+        ("starts.csv", starts(outcome)?),
+        ("profiles.csv", profiles(outcome)?),
+        ("report.html", report(outcome, &all, &drawn, folder)?),
+    ];
+    let mut files = files.into_iter();
+    files.try_for_each(|(name, text)| put(&folder.join(name), &text))
+}
+
+/// The page: what `calibration.json` has, with intervals in words and figures, which are read from the folder that they
+/// were drawn into.
+///
+/// # Errors
+/// [`text::Error::Internal`]; [`text::Error::Unreadable`].
+fn report(outcome: &Outcome, all: &Value, drawn: &Drawn, folder: &Path) -> Result<String, Error> {
+    let picture = |(name, heading): &(String, String)| {
+        let path = folder.join(format!("{name}.svg"));
+        let svg = std::fs::read_to_string(&path);
+        let svg = svg.map_err(|source| text::Error::Unreadable { path, source })?;
+        Ok(context! { heading, svg })
+    };
+    let pictures =
+        |all: &[(String, String)]| all.iter().map(picture).collect::<Result<Vec<_>, Error>>();
+    let words = |(i, p): (usize, &super::Parameter)| {
+        let linear = outcome.linear_interval(i);
+        context! {
+            interval => outcome.interval_in_words(i),
+            linear => linear.map_or_else(String::new, |some| words_of(Some(some))),
+            bounds => format!("{} to {}", digits(p.bounds[0]), digits(p.bounds[1])),
+        }
+    };
+    let contents = context! {
+        words => outcome.parameters.iter().enumerate().map(words).collect::<Vec<_>>(),
+        fits => pictures(&drawn.fits)?,
+        profiles => pictures(&drawn.profiles)?,
+        ..Template::from(Serde(all))
+    };
+    page(include_str!("page.html"), contents)
 }
 
 /// Refuses a folder that holds the results of a run, whose report would be replaced.
@@ -72,7 +103,7 @@ fn remove_figures(folder: &Path) {
 }
 
 /// Ends of an interval in words.
-pub(super) fn words_of(interval: Option<Interval>) -> String {
+fn words_of(interval: Option<Interval>) -> String {
     let Some(interval) = interval else {
         return "not determined".to_owned();
     };
@@ -97,8 +128,13 @@ pub(super) fn words_of(interval: Option<Interval>) -> String {
 }
 
 impl Outcome {
+    /// A parameter of a stage by its place there.
+    fn parameter(&self, stage: &Stage, place: usize) -> &super::Parameter {
+        &self.parameters[stage.group.parameters[place]]
+    }
+
     /// Interval, or why none exists.
-    pub(super) fn interval_in_words(&self, parameter: usize) -> String {
+    fn interval_in_words(&self, parameter: usize) -> String {
         let (stage, place) = self.places[parameter];
         let stage = &self.stages[stage];
         match stage.on_bound[place] {
@@ -200,235 +236,138 @@ fn aligned<const N: usize>(rows: &[[String; N]]) -> String {
     text
 }
 
-/// A cell that holds a name.
-fn cell(text: &str) -> String {
-    if text.contains([',', '"', '\n']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text.to_owned()
-    }
-}
-
 fn optional(value: Option<f64>) -> String {
     value.map(number).unwrap_or_default()
 }
 
-fn parameters(outcome: &Outcome) -> String {
-    let mut text =
-        "parameter,value,lower,upper,lower_end,upper_end,linear_lower,linear_upper,relative_error,unit\n"
-            .to_owned();
-    for (i, p) in outcome.parameters.iter().enumerate() {
-        let ends =
-            |interval: Option<Interval>| interval.map_or([None, None], |interval| interval.ends);
-        let [[low, high], [below, above]] =
-            [ends(outcome.interval(i)), ends(outcome.linear_interval(i))];
+fn parameters(outcome: &Outcome) -> Result<String, Error> {
+    let columns = "parameter,value,lower,upper,lower_end,upper_end,linear_lower,linear_upper,relative_error,unit";
+    let rows = outcome.parameters.iter().enumerate().map(|(i, p)| {
+        let ends = |interval: Option<Interval>| interval.map_or([None; 2], |found| found.ends);
+        let (interval, linear) = (outcome.interval(i), outcome.linear_interval(i));
+        let open = interval.map_or([""; 2], |interval| interval.open.map(Open::word));
         let (stage, place) = outcome.places[i];
         let error = outcome.stages[stage].error(place);
         let relative =
             error.map(|error| error * (p.slope(outcome.values[i]) / outcome.values[i]).abs());
-        let open = outcome
-            .interval(i)
-            .map(|interval| interval.open.map(Open::word));
-        let cells = [below, above, relative.filter(|r| r.is_finite())].map(optional);
-        let _ = writeln!(
-            text,
-            "{},{},{},{},{},{}",
-            cell(&p.name),
-            number(outcome.values[i]),
-            [low, high].map(optional).join(","),
-            open.unwrap_or(["", ""]).join(","),
-            cells.join(","),
-            cell(&p.unit),
-        );
-    }
-    text
+        let mut row = vec![p.name.clone(), number(outcome.values[i])];
+        row.extend(ends(interval).map(optional));
+        row.extend(open.map(str::to_owned));
+        row.extend(ends(linear).map(optional));
+        row.push(optional(relative.filter(|r| r.is_finite())));
+        row.push(p.unit.clone());
+        row
+    });
+    csv(columns.split(','), rows)
 }
 
-fn correlations(outcome: &Outcome) -> String {
-    let mut text = "stage,parameter,other,correlation\n".to_owned();
-    for stage in &outcome.stages {
-        let names = |place: usize| &outcome.parameters[stage.group.parameters[place]].name;
-        for a in 0..stage.best.len() {
-            for b in 0..a {
-                let value = stage.covariance.correlation(a, b);
-                let _ = writeln!(
-                    text,
-                    "{},{},{},{}",
-                    cell(&stage.group.name),
-                    cell(names(b)),
-                    cell(names(a)),
-                    optional(value)
-                );
-            }
-        }
-    }
-    text
+/// Rows of all stages, each after the name of its stage.
+fn of_stages(
+    outcome: &Outcome,
+    columns: &str,
+    rows: impl Fn(&Stage) -> Vec<Vec<String>>,
+) -> Result<String, Error> {
+    let with_name = |stage: &Stage| {
+        let name = |row: Vec<String>| [vec![stage.group.name.clone()], row].concat();
+        rows(stage).into_iter().map(name).collect::<Vec<_>>()
+    };
+    csv(
+        columns.split(','),
+        outcome.stages.iter().flat_map(with_name),
+    )
 }
 
-fn fit(outcome: &Outcome) -> String {
-    let mut text =
-        "test,predicted,x_column,y_column,x,measured,computed,noise,deviation,beyond_noise\n"
-            .to_owned();
-    for test in &outcome.tests {
-        for fitted in &test.curves {
-            let Curve {
-                x,
-                y,
-                points,
-                deviations,
-                ..
-            } = &fitted.curve;
-            for (i, (at, measured)) in points.iter().enumerate() {
-                let values = [*at, *measured, fitted.computed[i], deviations[i]];
-                let is_far = fitted.systematic.far.iter().any(|(point, _)| *point == i);
-                let _ = writeln!(
-                    text,
-                    "{},{},{x},{y},{},{},{is_far}",
-                    cell(&test.name),
-                    test.is_predicted,
-                    values.map(number).join(","),
-                    optional(fitted.deviations[i])
-                );
-            }
-        }
-    }
-    text
+fn correlations(outcome: &Outcome) -> Result<String, Error> {
+    of_stages(outcome, "stage,parameter,other,correlation", |stage| {
+        let name = |place: usize| outcome.parameter(stage, place).name.clone();
+        let pairs = (0..stage.best.len()).flat_map(|a| (0..a).map(move |b| (a, b)));
+        let row = |(a, b)| {
+            let value = stage.covariance.correlation(a, b);
+            vec![name(b), name(a), optional(value)]
+        };
+        pairs.map(row).collect()
+    })
 }
 
-fn starts(outcome: &Outcome) -> String {
-    let mut text = "stage,start,parameter,from,to,sum,iterations,optimum\n".to_owned();
-    for stage in &outcome.stages {
-        for (number_of, landing) in stage.landings.iter().enumerate() {
-            for (place, &p) in stage.group.parameters.iter().enumerate() {
-                let parameter = &outcome.parameters[p];
-                let to = landing.to.as_ref().map(|(u, _)| parameter.value(u[place]));
-                let _ = writeln!(
-                    text,
-                    "{},{},{},{},{},{},{},{}",
-                    cell(&stage.group.name),
-                    number_of + 1,
-                    cell(&parameter.name),
+fn fit(outcome: &Outcome) -> Result<String, Error> {
+    let columns =
+        "test,predicted,x_column,y_column,x,measured,computed,noise,deviation,beyond_noise";
+    let curves = outcome.tests.iter().flat_map(|test| {
+        let of_test = [test.name.clone(), test.is_predicted.to_string()];
+        test.curves
+            .iter()
+            .map(move |fitted| (of_test.clone(), fitted))
+    });
+    let rows = curves.flat_map(|(of_test, fitted)| {
+        let row = move |(i, (x, measured)): (usize, &(f64, f64))| {
+            let is_far = fitted.systematic.far.iter().any(|(point, _)| *point == i);
+            let values = [
+                *x,
+                *measured,
+                fitted.computed[i],
+                fitted.curve.deviations[i],
+            ];
+            let mut row = of_test.to_vec();
+            row.extend([fitted.curve.x.clone(), fitted.curve.y.clone()]);
+            row.extend(values.map(number));
+            row.extend([optional(fitted.deviations[i]), is_far.to_string()]);
+            row
+        };
+        fitted.curve.points.iter().enumerate().map(row)
+    });
+    csv(columns.split(','), rows)
+}
+
+fn starts(outcome: &Outcome) -> Result<String, Error> {
+    let columns = "stage,start,parameter,from,to,sum,iterations,optimum";
+    of_stages(outcome, columns, |stage| {
+        let mut rows = Vec::new();
+        for (start, landing) in stage.landings.iter().enumerate() {
+            for place in 0..stage.best.len() {
+                let parameter = outcome.parameter(stage, place);
+                let to = landing.to.as_ref();
+                rows.push(vec![
+                    (start + 1).to_string(),
+                    parameter.name.clone(),
                     number(parameter.value(landing.from[place])),
-                    optional(to),
-                    optional(landing.to.as_ref().map(|to| to.1)),
-                    landing.iterations,
+                    optional(to.map(|(u, _)| parameter.value(u[place]))),
+                    optional(to.map(|(_, sum)| *sum)),
+                    landing.iterations.to_string(),
                     landing
                         .optimum
-                        .map(|n| (n + 1).to_string())
-                        .unwrap_or_default()
-                );
+                        .map_or_else(String::new, |n| (n + 1).to_string()),
+                ]);
             }
         }
-    }
-    text
+        rows
+    })
 }
 
-fn profiles(outcome: &Outcome) -> String {
-    let mut text = "stage,parameter,value,sum\n".to_owned();
-    for stage in &outcome.stages {
-        for (place, profile) in stage.profiles.iter().enumerate() {
-            let parameter = &outcome.parameters[stage.group.parameters[place]];
-            for (u, sum) in &profile.points {
-                let values = [parameter.value(*u), *sum].map(number).join(",");
-                let _ = writeln!(
-                    text,
-                    "{},{},{values}",
-                    cell(&stage.group.name),
-                    cell(&parameter.name)
-                );
-            }
-        }
-    }
-    text
-}
-
-fn scale_name(scale: Scale) -> &'static str {
-    match scale {
-        Scale::Linear => "linear",
-        Scale::Log => "log",
-    }
+fn profiles(outcome: &Outcome) -> Result<String, Error> {
+    of_stages(outcome, "stage,parameter,value,sum", |stage| {
+        let profiles = stage.profiles.iter().enumerate();
+        let rows = profiles.flat_map(|(place, profile)| {
+            let parameter = outcome.parameter(stage, place);
+            let row = |(u, sum): &(f64, f64)| {
+                let value = parameter.value(*u);
+                vec![parameter.name.clone(), number(value), number(*sum)]
+            };
+            profile.points.iter().map(row)
+        });
+        rows.collect()
+    })
 }
 
 fn summary(outcome: &Outcome, calibration: &Calibration) -> Value {
-    let parameters = outcome.parameters.iter().enumerate().map(|(i, p)| {
-        let (stage, place) = outcome.places[i];
-        let interval = outcome.interval(i);
-        json!({
-            "name": p.name,
-            "parameter": p.id,
-            "laws": p.laws,
-            "unit": p.unit,
-            "doc": p.doc,
-            "value": outcome.values[i],
-            "interval": interval.map(|interval| interval.ends),
-            "interval_ends": interval.map(|interval| interval.open.map(Open::word)),
-            "interval_from": interval.map(|i| if i.is_of_profile { "profile" } else { "covariance" }),
-            "linear_interval": outcome.linear_interval(i).map(|interval| interval.ends),
-            "start": p.start,
-            "bounds": p.bounds,
-            "range": p.range,
-            "scale": scale_name(p.scale),
-            "stage": outcome.stages[stage].group.name,
-            "on_bound": outcome.stages[stage].on_bound[place] != [false, false],
-        })
-    });
-    let stages = outcome.stages.iter().map(|stage| {
-        let name = |place: usize| outcome.parameters[stage.group.parameters[place]].name.clone();
-        let n = stage.best.len();
-        let rows = (0..n).map(|a| {
-            let row = (0..n).map(|b| stage.covariance.correlation(a, b));
-            row.collect::<Vec<_>>()
-        });
-        let value = |u: &[f64]| {
-            let values = u.iter().enumerate().map(|(place, u)| {
-                let parameter = &outcome.parameters[stage.group.parameters[place]];
-                (parameter.name.clone(), json!(parameter.value(*u)))
-            });
-            values.collect::<serde_json::Map<_, _>>()
-        };
-        json!({
-            "name": stage.group.name,
-            "parameters": (0..n).map(name).collect::<Vec<_>>(),
-            "tests": stage.group.tests.iter().map(|&t| outcome.tests[t].name.clone()).collect::<Vec<_>>(),
-            "sum_of_squares": stage.sum,
-            "sum_without_weights": stage.plain_sum,
-            "residuals": stage.n_residuals,
-            "degrees_of_freedom": stage.degrees,
-            "variance": stage.variance,
-            "correlations": rows.collect::<Vec<_>>(),
-            "starts": stage.landings.len(),
-            "optima": stage.optima.iter().map(|optimum| json!({
-                "values": value(&optimum.u),
-                "sum_of_squares": optimum.sum,
-                "starts": optimum.times,
-                "as_good": optimum.is_as_good,
-            })).collect::<Vec<_>>(),
-            "ended": format!("{:?}", stage.end).to_lowercase(),
-            "shortened_steps": stage.failures,
-        })
-    });
+    let parameters = 0..outcome.parameters.len();
+    let parameters = parameters.map(|parameter| summary_of_parameter(outcome, parameter));
+    let stages = outcome.stages.iter();
     let tests = outcome.tests.iter().map(|test| {
         json!({
             "name": test.name,
             "predicted": test.is_predicted,
             "derivatives": if test.is_by_law { "law" } else { "differences" },
-            "curves": test.curves.iter().map(|fitted| json!({
-                "x": fitted.curve.x,
-                "y": fitted.curve.y,
-                "points": fitted.curve.points.len(),
-                "rms": fitted.rms,
-                "rms_over_noise": fitted.relative,
-                "explained": fitted.explained,
-                "correlation_of_neighbours": fitted.neighbours,
-                "residuals_follow_each_other": !fitted.systematic.follow.is_empty(),
-                "beyond_noise": fitted.systematic.far.iter().map(|&(point, times)| json!({
-                    "x": fitted.curve.points[point].0,
-                    "measured": fitted.curve.points[point].1,
-                    "computed": fitted.computed[point],
-                    "times": times,
-                })).collect::<Vec<_>>(),
-                "inside_interval_of_prediction": fitted.inside,
-            })).collect::<Vec<_>>(),
+            "curves": test.curves.iter().map(summary_of_curve).collect::<Vec<_>>(),
         })
     });
     json!({
@@ -441,11 +380,92 @@ fn summary(outcome: &Outcome, calibration: &Calibration) -> Value {
         "confidence": outcome.confidence,
         "variance": match outcome.variance { Variance::Estimated => "estimated", Variance::Given => "given" },
         "parameters": parameters.collect::<Vec<_>>(),
-        "stages": stages.collect::<Vec<_>>(),
+        "stages": stages.map(|stage| summary_of_stage(outcome, stage)).collect::<Vec<_>>(),
         "tests": tests.collect::<Vec<_>>(),
         "warnings": outcome.words[..outcome.warnings],
         "notes": outcome.words[outcome.warnings..],
         "block": outcome.block,
         "computations": outcome.computations,
+    })
+}
+
+fn summary_of_parameter(outcome: &Outcome, parameter: usize) -> Value {
+    let p = &outcome.parameters[parameter];
+    let (stage, place) = outcome.places[parameter];
+    let stage = &outcome.stages[stage];
+    let interval = outcome.interval(parameter);
+    json!({
+        "name": p.name,
+        "parameter": p.id,
+        "laws": p.laws,
+        "unit": p.unit,
+        "doc": p.doc,
+        "value": outcome.values[parameter],
+        "interval": interval.map(|interval| interval.ends),
+        "interval_ends": interval.map(|interval| interval.open.map(Open::word)),
+        "interval_from": interval.map(|i| if i.is_of_profile { "profile" } else { "covariance" }),
+        "linear_interval": outcome.linear_interval(parameter).map(|interval| interval.ends),
+        "start": p.start,
+        "bounds": p.bounds,
+        "range": p.range,
+        "scale": match p.scale { Scale::Linear => "linear", Scale::Log => "log" },
+        "stage": stage.group.name,
+        "on_bound": stage.on_bound[place] != [false, false],
+    })
+}
+
+fn summary_of_stage(outcome: &Outcome, stage: &Stage) -> Value {
+    let n = stage.best.len();
+    let name = |place: usize| outcome.parameter(stage, place).name.clone();
+    let row = |a: usize| {
+        let row = (0..n).map(|b| stage.covariance.correlation(a, b));
+        row.collect::<Vec<_>>()
+    };
+    let values = |u: &[f64]| {
+        let values = u.iter().enumerate().map(|(place, u)| {
+            let value = outcome.parameter(stage, place).value(*u);
+            (name(place), json!(value))
+        });
+        values.collect::<serde_json::Map<_, _>>()
+    };
+    json!({
+        "name": stage.group.name,
+        "parameters": (0..n).map(name).collect::<Vec<_>>(),
+        "tests": stage.group.tests.iter().map(|&t| outcome.tests[t].name.clone()).collect::<Vec<_>>(),
+        "sum_of_squares": stage.sum,
+        "sum_without_weights": stage.plain_sum,
+        "residuals": stage.n_residuals,
+        "degrees_of_freedom": stage.degrees,
+        "variance": stage.variance,
+        "correlations": (0..n).map(row).collect::<Vec<_>>(),
+        "starts": stage.landings.len(),
+        "optima": stage.optima.iter().map(|optimum| json!({
+            "values": values(&optimum.u),
+            "sum_of_squares": optimum.sum,
+            "starts": optimum.times,
+            "as_good": optimum.is_as_good,
+        })).collect::<Vec<_>>(),
+        "ended": format!("{:?}", stage.end).to_lowercase(),
+        "shortened_steps": stage.failures,
+    })
+}
+
+fn summary_of_curve(fitted: &FittedCurve) -> Value {
+    let points = &fitted.curve.points;
+    let far = fitted.systematic.far.iter().map(|&(point, times)| {
+        let (x, measured) = points[point];
+        json!({ "x": x, "measured": measured, "computed": fitted.computed[point], "times": times })
+    });
+    json!({
+        "x": fitted.curve.x,
+        "y": fitted.curve.y,
+        "points": points.len(),
+        "rms": fitted.rms,
+        "rms_over_noise": fitted.relative,
+        "explained": fitted.explained,
+        "correlation_of_neighbours": fitted.neighbours,
+        "residuals_follow_each_other": !fitted.systematic.follow.is_empty(),
+        "beyond_noise": far.collect::<Vec<_>>(),
+        "inside_interval_of_prediction": fitted.inside,
     })
 }

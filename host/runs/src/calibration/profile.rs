@@ -1,7 +1,6 @@
 //! The profile of a parameter: the least sum of squares for values next to the best one.
 
-use super::fit::Stage;
-use super::model::Model;
+use super::stage::Stage;
 use crate::Error;
 
 /// The least sum of squares for values of one parameter next to the best.
@@ -43,16 +42,14 @@ const BETTER: f64 = 1e-3;
 
 /// The best of the others for a value of the parameter, looked for from a place nearby: that place, with
 /// the sum there; `None` where the tests cannot be computed.
-pub(super) type Others<'f> =
-    dyn FnMut(&mut Model, f64, &[f64]) -> Result<Option<(Vec<f64>, f64)>, Error> + 'f;
+pub(super) type Others<'f> = dyn FnMut(f64, &[f64]) -> Result<Option<(Vec<f64>, f64)>, Error> + 'f;
 
 /// Follows the profile of a parameter to either side, until it leaves the interval of confidence; and a
 /// better place, if one was met.
 ///
 /// # Errors
-/// As [`Model::computed`].
+/// As [`super::model::Model::computed`].
 pub(super) fn follow(
-    model: &mut Model,
     stage: &Stage,
     place: usize,
     bounds: [f64; 2],
@@ -70,7 +67,7 @@ pub(super) fn follow(
             points: Vec::new(),
             better: None,
         };
-        profile.sides[side] = walk.walk(model, others)?;
+        profile.sides[side] = walk.walk(others)?;
         better = better.or(walk.better);
         points[side] = walk.points;
     }
@@ -94,7 +91,7 @@ struct Walk<'s> {
 
 impl Walk<'_> {
     #[expect(clippy::float_cmp, reason = "a value that was brought to its bound")]
-    fn walk(&mut self, model: &mut Model, others: &mut Others<'_>) -> Result<Side, Error> {
+    fn walk(&mut self, others: &mut Others<'_>) -> Result<Side, Error> {
         let (stage, place) = (self.stage, self.place);
         let best = stage.best[place];
         let allowance = stage.allowance(place);
@@ -117,7 +114,7 @@ impl Walk<'_> {
             } else {
                 wanted.min(self.bound)
             };
-            let Some((u, sum)) = others(model, target, &near)? else {
+            let Some((u, sum)) = others(target, &near)? else {
                 // The law cannot follow there: a shorter step may do.
                 is_barred = true;
                 step *= 0.3;

@@ -10,8 +10,8 @@
 //! A computed value changes by g = ∂y/∂u: its variance is s² |gᵀL|², and is unbounded where gᵀz is
 //! not 0.
 
-use super::fit::Stage;
 use super::model::Model;
+use super::stage::Stage;
 use crate::Error;
 use nalgebra::DMatrix;
 

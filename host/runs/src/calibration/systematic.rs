@@ -14,8 +14,8 @@
 
 use super::curve::Curve;
 use super::fitted::FittedCurve;
-use super::messages::digits;
 use super::statistics::{of_neighbours, two_sided};
+use crate::experiment::digits;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// One calibration in this many.

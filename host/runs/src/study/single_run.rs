@@ -180,7 +180,7 @@ fn standing_after(error: Option<&Error>) -> Standing {
         Kind::Stopped => State::Interrupted,
         Kind::Input => State::Failed("bad input".to_owned()),
         Kind::Internal => State::Failed("internal error".to_owned()),
-        _ => State::Failed(ending(Some(error)).status.to_owned()),
+        _ => State::Failed(ending(Some(error)).status.clone()),
     };
     let reason = match state {
         State::Interrupted => String::new(),

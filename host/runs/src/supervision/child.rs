@@ -1,6 +1,6 @@
 //! The child's side: it says where it is and how it ends, and looks whether it is to stop.
 
-use super::{CALLS, FOLDER, FOLDER_WORDS, Page, word};
+use super::page::{CALLS, FOLDER, FOLDER_WORDS, Page, word};
 use law::Stop;
 use law::current_call;
 use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};

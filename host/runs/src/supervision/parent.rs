@@ -1,8 +1,9 @@
 //! The watcher's side: it starts the child, passes requests to stop on, and makes of the child's end
 //! what it is.
 
+use super::page::{Page, SIZE, word};
 use super::signals::Signals;
-use super::{Page, SIZE, STOPPING, child, word};
+use super::{STOPPING, child};
 use crate::Error;
 use law::child::{Ending, can_be_copied, copy, ending};
 use law::current_call::Seen;

@@ -13,10 +13,9 @@ mod search;
 mod table;
 
 use super::scheme::Values;
-use super::trial::Scratch;
-use super::trial_cache::Kept;
+use super::trials::Trials;
 use crate::Error;
-use crate::run::{Observer, Options, identity_of, run_reusing};
+use crate::run::{Observer, Options, run_reusing};
 use input::Case;
 use input::accuracy_settings::{AccuracySettings, Verdict};
 use input::material::ParameterValue;
@@ -31,15 +30,6 @@ use table::Table;
 const WITHOUT_MESH: f64 = 0.5;
 /// Its name in progress messages.
 const STUDY: &str = "accuracy";
-
-/// The case with settings that reach the accuracy it asks for; `None` if it asks for none.
-/// `folder` is where the study may write, and leaves nothing.
-///
-/// # Errors
-/// Bad input before anything is written; no equilibrium with any increments; [`text::Error::Unwritable`].
-pub fn reach(case: &Case, folder: &Path) -> Result<Option<Case>, Error> {
-    reach_until(case, (folder, false), &Stop::never(), &mut |_| ())
-}
 
 /// Runs a case; where it asks for an accuracy, with settings that reach it.
 ///
@@ -82,11 +72,12 @@ fn of_trials(error: Error) -> Error {
     }
 }
 
-/// As [`reach`], to be stopped on its way, and to go on (`resume`) with what is kept of an earlier study
-/// in the folder. `say` takes what is being done.
+/// The case with settings that reach the accuracy it asks for; `None` if it asks for none. `folder` is where the study
+/// may write; with `resume` it goes on with what is kept there of an earlier one. `say` takes what is being done.
 ///
 /// # Errors
-/// As [`reach`]; [`law::Stopped`]; what is kept belongs to another case.
+/// Bad input before anything is written; no equilibrium with any increments; [`text::Error::Unwritable`];
+/// [`law::Stopped`]; what is kept belongs to another case.
 pub fn reach_until(
     case: &Case,
     (folder, resume): (&Path, bool),
@@ -105,14 +96,12 @@ pub fn reach_until(
     if !resume {
         results::make_way(folder)?;
     }
-    let kept = Kept::begin(folder, &identity_of(case)?, resume)?;
-    let scratch = Scratch::new(folder, stop)?.keeping(kept);
+    let trials = Trials::begin(case, folder, resume, stop)?;
     let asked = *accuracy.get_ref();
     let with_mesh = case.file.accuracy_with_mesh.as_ref();
     let with_mesh = with_mesh.is_some_and(|with| *with.get_ref());
     let mut search = Search {
-        case,
-        scratch: &scratch,
+        trials: &trials,
         asked: if with_mesh {
             WITHOUT_MESH * asked
         } else {

@@ -1,19 +1,20 @@
 //! The study of a case: one setting at a time away from the file's, and some together.
 
 use super::accuracy::messages;
-use super::clock::cpu_seconds;
 use super::driver_study::in_one_line;
 use super::expected::Expected;
-use super::progress::in_words;
-use super::sampled::{Convergence, Sampled};
 use super::scheme::{Scheme, Values, schemes};
+use super::settings::{BY_FORCE, SOLVER_CHOICES, Settings, SolverChoice, with_choice};
 use super::study::{Done, Measurement, Reference, Row, Study};
-use super::trial::{BY_FORCE, SOLVER_CHOICES, Scratch, Settings, Timing, Trial};
+use super::trials::Trials;
 use crate::Error;
+use crate::experiment::clock::cpu_seconds;
+use crate::experiment::progress::in_words;
+use crate::experiment::rows::Convergence;
+use crate::experiment::{Rows, Timing, Trial};
 use crate::run::begin;
 use input::Case;
 use law::BuiltLaw;
-use mechanics::equilibrium::Reuse;
 use mechanics::problem::{Formulation, Integration};
 use mechanics::settings::Convergence as Counted;
 use std::time::{Duration, Instant};
@@ -71,23 +72,22 @@ const TIGHT: f64 = 1e-10;
 /// Runs the study, and hands it to `done` after every row. `fine`: the mesh is also divided by 4.
 /// `thorough`: all settings are tried, however long they take.
 pub(super) fn study(
-    case: &Case,
+    trials: &Trials<'_>,
     study: &mut Study,
     (fine, thorough): (bool, bool),
-    scratch: &Scratch,
     (done, say): (&mut Done<'_>, &mut dyn FnMut(&str)),
 ) -> Result<(), Error> {
+    let case = trials.case;
     refuse_without_probes(case, "there is nothing to measure the error of")?;
     let mut cases = Cases {
-        case,
-        scratch,
+        trials,
         say,
         plan: &WHOLE,
         expected: Expected::default(),
         unit: 1.0,
         left: Vec::new(),
     };
-    let mut default = cases.run(&Settings::default(), Timing::Repeated, 0)?;
+    let default = cases.run(&Settings::default(), Timing::Repeated, 0)?;
     // Counted in runs with the file's settings; that one was repeated.
     cases.unit = default.seconds;
     study.columns.clone_from(&default.rows.names);
@@ -114,25 +114,19 @@ pub(super) fn study(
         study.notes.push(note);
     }
     let divisions: &[usize] = if fine { &[2, 4] } else { &[2] };
-    for increments in cases.plan.reference_factors {
-        cases.expect(
-            &Settings {
-                increments,
-                ..cases.tight()
-            },
-            Timing::Once,
-        );
+    for factor in cases.plan.reference_factors {
+        cases.expect(&cases.tight().with_increments(factor), Timing::Once);
     }
     for &division in divisions {
-        cases.expect(&divided(division), Timing::Repeated);
+        cases.expect(&Settings::default().divided(division), Timing::Repeated);
     }
     let laws = if cases.plan.schemes {
         (cases.say)("which schemes of the laws there are");
-        law_schemes(case, scratch)?
+        law_schemes(trials)?
     } else {
         Vec::new()
     };
-    let settings = settings_on_this_mesh(case, &laws, cases.plan);
+    let settings = settings_on_this_mesh(case, &laws, cases.plan)?;
     for (_, settings) in &settings {
         cases.expect(settings, Timing::Repeated);
         for _ in 0..cases.plan.more_rounds {
@@ -160,20 +154,10 @@ pub(super) fn study(
         study.judge();
         done(study)?;
     }
-    for round in 1..=cases.plan.more_rounds {
-        for (number, settings) in &timed {
-            if let Ok(measured) = &mut study.rows[*number].outcome {
-                let seconds = cases.run(settings, Timing::Once, round)?.seconds;
-                measured.seconds = measured.seconds.min(seconds);
-            }
-        }
-    }
-    if let Ok(measured) = &study.rows[0].outcome {
-        default.seconds = measured.seconds;
-    }
+    let seconds = cases.more_rounds(study, &timed)?.unwrap_or(default.seconds);
     let defaults = study.rows.iter_mut().filter(|row| row.is_default);
     for measured in defaults.filter_map(|row| row.outcome.as_mut().ok()) {
-        measured.seconds = default.seconds;
+        measured.seconds = seconds;
     }
     study.judge();
     Ok(())
@@ -193,32 +177,22 @@ fn settings_on_this_mesh(
     case: &Case,
     laws: &[(String, Scheme)],
     plan: &Plan,
-) -> Vec<(String, Settings)> {
+) -> Result<Vec<(String, Settings)>, Error> {
     let mut all = Vec::new();
-    let default = Settings::default();
     let mut add = |family: &str, settings: Settings| all.push((family.to_owned(), settings));
-    let fewer_or_more = |factor: f64| Settings {
-        increments: factor,
-        ..default.clone()
-    };
+    let with_increments = |factor: f64| Settings::default().with_increments(factor);
+    let with_solver = |choice: SolverChoice| Settings::default().with_solver(choice);
     for &factor in plan.factors {
-        add("increments", fewer_or_more(factor));
+        add("increments", with_increments(factor));
     }
     let file = case.file.solver.get_ref();
     let is_new = |tolerance: &f64| (tolerance / file.force_tolerance - 1.0).abs() > 1e-9;
     for tolerance in plan.tolerances.iter().copied().filter(is_new) {
-        let settings = Settings {
-            tolerance: Some(tolerance),
-            ..default.clone()
-        };
-        add("tolerance", settings);
+        add("tolerance", Settings::default().with_tolerance(tolerance));
     }
     for factor in [0.25, 0.5] {
         for &tolerance in plan.loose_tolerances {
-            let settings = Settings {
-                tolerance: Some(tolerance),
-                ..fewer_or_more(factor)
-            };
+            let settings = with_increments(factor).with_tolerance(tolerance);
             add("increments and tolerance", settings);
         }
     }
@@ -229,46 +203,31 @@ fn settings_on_this_mesh(
             factors.extend([0.25, 0.5, 4.0]);
         }
         for factor in factors {
-            let settings = Settings {
-                law: Some(scheme.of(law)),
-                ..fewer_or_more(factor)
-            };
-            add(&family, settings);
+            add(&family, with_increments(factor).with_scheme(law, scheme));
         }
     }
     for choice in SOLVER_CHOICES {
-        let mut with = *file;
-        (choice.set)(&mut with);
-        if with != *file {
-            let settings = Settings {
-                solver: Some(choice),
-                ..default.clone()
-            };
-            add("solver", settings);
+        if with_choice(file, choice)? != *file {
+            add("solver", with_solver(choice));
         }
     }
     if file.convergence != Counted::Force {
         for &tolerance in plan.loose_tolerances {
-            let settings = Settings {
-                tolerance: Some(tolerance),
-                solver: Some(&BY_FORCE),
-                ..default.clone()
-            };
-            add("solver", settings);
+            add("solver", with_solver(BY_FORCE).with_tolerance(tolerance));
         }
     }
-    all
+    Ok(all)
 }
 
-fn measurement(trial: &Trial, reference: &Sampled, scale: &[f64]) -> Measurement {
+fn measurement(trial: &Trial, reference: &Rows, scale: &[f64]) -> Measurement {
     let errors = trial.rows.differences(reference, scale);
-    Measurement::new(trial.seconds, trial.counts.clone(), errors)
+    Measurement::new(trial.seconds, trial.counts.all(), errors)
 }
 
 /// The finest run, with the differences that lead to it.
 struct Finest {
-    rows: Sampled,
-    coarser: [Sampled; 2],
+    rows: Rows,
+    coarser: [Rows; 2],
 }
 
 impl Finest {
@@ -295,8 +254,7 @@ impl Finest {
 }
 
 struct Cases<'a> {
-    case: &'a Case,
-    scratch: &'a Scratch,
+    trials: &'a Trials<'a>,
     say: &'a mut dyn FnMut(&str),
     plan: &'static Plan,
     expected: Expected,
@@ -306,31 +264,24 @@ struct Cases<'a> {
     left: Vec<(Settings, Timing)>,
 }
 
-fn divided(division: usize) -> Settings {
-    Settings {
-        division,
-        ..Settings::default()
-    }
-}
-
 impl Cases<'_> {
     fn run(&mut self, settings: &Settings, timing: Timing, round: usize) -> Result<Trial, Error> {
-        if let Some(next) = self.left.iter().position(|(of, _)| of.is(settings)) {
+        if let Some(next) = self.left.iter().position(|(of, _)| of == settings) {
             self.left.remove(next);
         }
-        if self.scratch.has(settings, round) {
-            return self.scratch.trial(self.case, settings, timing, round);
+        if self.trials.has(settings, round) {
+            return self.trials.run(settings, timing, round);
         }
         let line = self.line(settings, timing);
         (self.say)(&line);
         let bounded = self.bounded(settings, timing);
         let (started, cpu) = (Instant::now(), cpu_seconds());
-        let outcome = self.scratch.trial(self.case, settings, bounded, round);
+        let outcome = self.trials.run(settings, bounded, round);
         let spent = [started.elapsed().as_secs_f64(), cpu_seconds() - cpu];
         let once = outcome.as_ref().ok().map(|trial| trial.seconds);
         self.expected.took(settings, spent, once);
         // Whatever became of it, the study goes no further once it is to stop.
-        self.scratch.stop.check("the study")?;
+        self.trials.stop.check("the study")?;
         outcome
     }
 
@@ -367,10 +318,8 @@ impl Cases<'_> {
 
     /// The file's settings with the tolerance of the reference.
     fn tight(&self) -> Settings {
-        Settings {
-            tolerance: Some(TIGHT.min(self.case.file.solver.get_ref().force_tolerance)),
-            ..Settings::default()
-        }
+        let given = self.trials.case.file.solver.get_ref().force_tolerance;
+        Settings::default().with_tolerance(TIGHT.min(given))
     }
 
     fn row(
@@ -378,11 +327,11 @@ impl Cases<'_> {
         family: String,
         settings: &Settings,
         number: usize,
-        reference: &Sampled,
+        reference: &Rows,
         scale: &[f64],
     ) -> Result<Row, Error> {
         let outcome = self.run(settings, Timing::Repeated, 0);
-        self.scratch.stop.check("the study")?;
+        self.trials.stop.check("the study")?;
         let outcome = outcome.map(|trial| measurement(&trial, reference, scale));
         Ok(Row {
             family,
@@ -393,21 +342,36 @@ impl Cases<'_> {
         })
     }
 
+    /// Times settings, by the number of their row, in all rounds after the first. Returns the seconds of the first row.
+    fn more_rounds(
+        &mut self,
+        study: &mut Study,
+        timed: &[(usize, Settings)],
+    ) -> Result<Option<f64>, Error> {
+        for round in 1..=self.plan.more_rounds {
+            for (number, settings) in timed {
+                if let Ok(measured) = &mut study.rows[*number].outcome {
+                    let seconds = self.run(settings, Timing::Once, round)?.seconds;
+                    measured.seconds = measured.seconds.min(seconds);
+                }
+            }
+        }
+        let first = study.rows[0].outcome.as_ref();
+        Ok(first.ok().map(|measured| measured.seconds))
+    }
+
     /// The finest run on the file's mesh: many increments, a tight tolerance, and the scheme that
     /// changes least when the increments are halved.
     fn path_reference(&mut self, laws: &[(String, Scheme)]) -> Result<(Reference, Finest), Error> {
         let tight = self.tight();
         let mut candidates = vec![tight.clone()];
         let finest = laws.iter().filter(|(_, s)| s.is_finest && !s.is_default);
-        candidates.extend(finest.map(|(law, scheme)| Settings {
-            law: Some(scheme.of(law)),
-            ..tight.clone()
-        }));
+        candidates.extend(finest.map(|(law, scheme)| tight.clone().with_scheme(law, scheme)));
         if candidates.len() > 1 {
             let mut rated = Vec::new();
             for candidate in candidates {
                 let [a, b] = [2.0, 4.0].map(|factor| self.at(&candidate, factor));
-                self.scratch.stop.check("the study")?;
+                self.trials.stop.check("the study")?;
                 let difference = match (a, b) {
                     (Ok(a), Ok(b)) => a.rows.difference(&b.rows, &b.rows.largest()),
                     _ => f64::INFINITY,
@@ -423,16 +387,10 @@ impl Cases<'_> {
         for candidate in candidates {
             let [coarse, middle, fine] =
                 self.plan.reference_factors.map(|f| self.at(&candidate, f));
-            self.scratch.stop.check("the study")?;
+            self.trials.stop.check("the study")?;
             match (coarse, middle, fine) {
                 (Ok(coarse), Ok(middle), Ok(fine)) => {
-                    let label = |increments: f64| {
-                        let settings = Settings {
-                            increments,
-                            ..candidate.clone()
-                        };
-                        settings.label()
-                    };
+                    let label = |factor| candidate.clone().with_increments(factor).label();
                     let [_, next, finest] = self.plan.reference_factors.map(label);
                     let scale = fine.rows.largest();
                     let runs = [&coarse.rows, &middle.rows, &fine.rows];
@@ -452,10 +410,7 @@ impl Cases<'_> {
     }
 
     fn at(&mut self, settings: &Settings, increments: f64) -> Result<Trial, Error> {
-        let settings = Settings {
-            increments,
-            ..settings.clone()
-        };
+        let settings = settings.clone().with_increments(increments);
         self.run(&settings, Timing::Once, 0)
     }
 
@@ -468,11 +423,11 @@ impl Cases<'_> {
         divisions: &[usize],
         done: &mut Done<'_>,
     ) -> Result<(), Error> {
-        let mut trials = vec![(divided(1), Ok(default.clone()))];
+        let mut trials = vec![(Settings::default(), Ok(default.clone()))];
         for &division in divisions {
-            let settings = divided(division);
+            let settings = Settings::default().divided(division);
             let run = self.run(&settings, Timing::Repeated, 0);
-            self.scratch.stop.check("the study")?;
+            self.trials.stop.check("the study")?;
             trials.push((settings, run));
         }
         let ran: Vec<(&Settings, &Trial)> = trials
@@ -488,34 +443,27 @@ impl Cases<'_> {
             }
             return Ok(());
         };
+        let label = |settings: &Settings| match settings.division {
+            1 => "the file's mesh".to_owned(),
+            _ => settings.label(),
+        };
         let rows = reference.rows.clone();
         let coarse = ran.len().checked_sub(3).map(|i| ran[i].1);
         let number = study.references.len();
         study.references.push(Reference {
             label: finest.label(),
-            next: if next.division == 1 {
-                "the file's mesh".to_owned()
-            } else {
-                next.label()
-            },
+            next: label(next),
             convergence: Convergence::of(
                 coarse.map(|coarse| coarse.rows.difference(&before.rows, scale)),
                 before.rows.difference(&rows, scale),
             ),
         });
         let finest = finest.division;
-        for (settings, run) in &trials {
-            if settings.division == finest {
-                continue;
-            }
+        for (settings, run) in trials.iter().filter(|(of, _)| of.division != finest) {
             let outcome = run.as_ref().map(|trial| measurement(trial, &rows, scale));
             study.rows.push(Row {
                 family: "mesh".to_owned(),
-                label: if settings.division == 1 {
-                    "the file's mesh".to_owned()
-                } else {
-                    settings.label()
-                },
+                label: label(settings),
                 is_default: settings.division == 1,
                 reference: number,
                 outcome: outcome.map_err(in_one_line),
@@ -534,17 +482,12 @@ impl Cases<'_> {
 
     /// Integrations of thin layers that no layer has in the file.
     fn integrations(&self) -> Vec<Settings> {
-        let layers: Vec<Integration> = self
-            .case
-            .file
-            .groups
-            .values()
-            .map(toml::Spanned::get_ref)
-            .filter(|group| group.formulation == Formulation::ThinLayer)
-            .map(|group| {
-                let given = group.integration.as_ref();
-                given.map_or(Integration::Full, |i| *i.get_ref())
-            })
+        let groups = self.trials.case.file.groups.values();
+        let groups = groups.map(toml::Spanned::get_ref);
+        let layers = groups.filter(|group| group.formulation == Formulation::ThinLayer);
+        let layers: Vec<Integration> = layers
+            .map(|group| group.integration.as_ref().map(|i| *i.get_ref()))
+            .map(|integration| integration.unwrap_or(Integration::Full))
             .collect();
         let mut others = vec![Integration::Full, Integration::Reduced, Integration::Mean];
         others.retain(|integration| !layers.is_empty() && !layers.contains(integration));
@@ -557,20 +500,21 @@ impl Cases<'_> {
 }
 
 /// Schemes of the laws that have any, by the law's name in the file.
-pub(super) fn law_schemes(case: &Case, scratch: &Scratch) -> Result<Vec<(String, Scheme)>, Error> {
-    let (_, laws) = begin(case, Reuse::default())?;
+pub(super) fn law_schemes(trials: &Trials<'_>) -> Result<Vec<(String, Scheme)>, Error> {
+    let (_, laws) = begin(trials.case)?;
     let mut found: Vec<(String, Scheme)> = Vec::new();
     for ((name, _), built) in &laws {
         if found.iter().any(|(known, _)| known == name) {
             continue;
         }
         let few = |values: &Values| {
-            let settings = Settings {
-                increments: 0.25,
-                law: Some((name.clone(), values.clone(), String::new())),
-                ..Settings::default()
+            let scheme = Scheme {
+                values: values.clone(),
+                ..Scheme::default()
             };
-            let run = scratch.trial(case, &settings, Timing::Once, 0).ok()?;
+            let settings = Settings::default().with_increments(0.25);
+            let settings = settings.with_scheme(name, &scheme);
+            let run = trials.run(&settings, Timing::Once, 0).ok()?;
             Some(run.rows)
         };
         let mut all = schemes(
@@ -586,7 +530,7 @@ pub(super) fn law_schemes(case: &Case, scratch: &Scratch) -> Result<Vec<(String,
                 all[i - 1].is_finest = true;
             }
         }
-        scratch.stop.check("the study")?;
+        trials.stop.check("the study")?;
         let named = all.into_iter().filter(|scheme| !scheme.label.is_empty());
         found.extend(named.map(|scheme| (name.clone(), scheme)));
     }

@@ -16,7 +16,7 @@ impl Study {
     ///
     /// # Errors
     /// Why it cannot be drawn.
-    pub fn diagram(&self) -> Result<String, String> {
+    pub(super) fn diagram(&self) -> Result<String, String> {
         let mut text = String::new();
         draw(&mut text, self).map_err(|error| error.to_string())?;
         Ok(text)
@@ -110,32 +110,30 @@ fn legend(
     families: &[&str],
     colours: &[RGBColor],
 ) -> Result<(), Failure> {
+    let words = |text: &str, y: i32| {
+        let font = ("sans-serif", 12);
+        area.draw(&Text::new(text.to_owned(), (20, y - 6), font))
+    };
+    let line = |from: i32, to: i32, y: i32, style: ShapeStyle| {
+        area.draw(&PathElement::new([(from, y), (to, y)], style))
+    };
     let mut y = 44;
     for (family, colour) in families.iter().zip(colours) {
         area.draw(&Circle::new((8, y), 4, colour.filled()))?;
-        area.draw(&Text::new(*family, (20, y - 6), ("sans-serif", 12)))?;
+        words(family, y)?;
         y += LINE;
     }
     y += LINE / 2;
     area.draw(&Circle::new((8, y), 7, BLACK.stroke_width(2)))?;
-    area.draw(&Text::new(
-        "as in the file",
-        (20, y - 6),
-        ("sans-serif", 12),
-    ))?;
+    words("as in the file", y)?;
     y += LINE;
-    area.draw(&PathElement::new([(0, y), (16, y)], BLACK.stroke_width(1)))?;
-    area.draw(&Text::new(
-        "nothing beats these",
-        (20, y - 6),
-        ("sans-serif", 12),
-    ))?;
+    line(0, 16, y, BLACK.stroke_width(1))?;
+    words("nothing beats these", y)?;
     y += LINE;
     let grey = BLACK.mix(0.45).stroke_width(1);
-    area.draw(&PathElement::new([(0, y), (6, y)], grey))?;
-    area.draw(&PathElement::new([(10, y), (16, y)], grey))?;
-    let text = "uncertainty of the reference";
-    area.draw(&Text::new(text, (20, y - 6), ("sans-serif", 12)))
+    line(0, 6, y, grey)?;
+    line(10, 16, y, grey)?;
+    words("uncertainty of the reference", y)
 }
 
 /// The label of a decade; a power of ten is not exact in binary.

@@ -1,11 +1,11 @@
 //! The study of a driver: increments per segment × integration scheme of the law.
 
-use super::clock::seconds_of_a_call;
-use super::progress::Pace;
-use super::sampled::Sampled;
 use super::scheme::{Scheme, schemes};
 use super::study::{Done, Measurement, ROWS, Reference, Row, Study};
 use crate::Error;
+use crate::experiment::Rows;
+use crate::experiment::clock::seconds_of_a_call;
+use crate::experiment::progress::Pace;
 use input::Driver;
 use law::Stop;
 
@@ -41,7 +41,7 @@ pub(super) fn study(
             run(a) != run(b)
         },
     );
-    let drivers = schemes
+    let mut drivers = schemes
         .into_iter()
         .map(|scheme| Ok((driver.with_parameters(&scheme.values)?, scheme)))
         .collect::<Result<Vec<_>, Error>>()?;
@@ -53,43 +53,39 @@ pub(super) fn study(
     study.references.push(found.reference);
     study.notes = found.notes;
     let own = driver.point().segment_increments();
+    let mut plan: Vec<(usize, Vec<usize>)> = Vec::new();
+    for (number, (_, scheme)) in drivers.iter().enumerate() {
+        let counts = INCREMENTS.into_iter().filter(|n| *n <= most);
+        let counts = counts.map(|n| vec![n; n_segments]);
+        let has_own = counts.clone().any(|increments| increments == own);
+        let added = (scheme.is_default && !has_own).then(|| own.clone());
+        plan.extend(counts.chain(added).map(|increments| (number, increments)));
+    }
     // What does not depend on the increments is as long as some of them.
     let weight = |increments: &[usize]| 100.0 + increments.iter().sum::<usize>() as f64;
-    let mut pace = Pace::new(0.0);
-    let of_scheme = INCREMENTS.into_iter().filter(|n| *n <= most);
-    let of_scheme: f64 = of_scheme.map(|n| weight(&vec![n; n_segments])).sum();
-    pace.add(drivers.len() as f64 * of_scheme);
-    for (mut driver, scheme) in drivers {
-        let mut numbers: Vec<Vec<usize>> = INCREMENTS
-            .into_iter()
-            .filter(|n| *n <= most)
-            .map(|n| vec![n; n_segments])
-            .collect();
-        if scheme.is_default && !numbers.contains(&own) {
-            numbers.push(own.clone());
-        }
-        for increments in numbers {
-            say(&pace.line(&label(&scheme, &increments)));
-            driver.point_mut().set_increments(&increments);
-            let outcome = measure(&driver, &found.rows, &found.scale);
-            stop.check("the study")?;
-            pace.did(weight(&increments));
-            study.rows.push(Row {
-                family: family(&scheme),
-                label: label(&scheme, &increments),
-                is_default: scheme.is_default && increments == own,
-                reference: 0,
-                outcome: outcome.map_err(|error| in_one_line(&error)),
-            });
-            study.judge();
-            done(study)?;
-        }
+    let mut pace = Pace::new(plan.iter().map(|(_, increments)| weight(increments)).sum());
+    for (number, increments) in plan {
+        let (driver, scheme) = &mut drivers[number];
+        say(&pace.line(&label(scheme, &increments)));
+        driver.point_mut().set_increments(&increments);
+        let outcome = measure(driver, &found.rows, &found.scale);
+        stop.check("the study")?;
+        pace.did(weight(&increments));
+        study.rows.push(Row {
+            family: family(scheme),
+            label: label(scheme, &increments),
+            is_default: scheme.is_default && increments == own,
+            reference: 0,
+            outcome: outcome.map_err(|error| in_one_line(&error)),
+        });
+        study.judge();
+        done(study)?;
     }
     Ok(())
 }
 
 struct Found {
-    rows: Sampled,
+    rows: Rows,
     scale: Vec<f64>,
     reference: Reference,
     notes: Vec<String>,
@@ -128,7 +124,7 @@ fn find_reference(
     let Some((reference, rows, scale)) = candidates.next() else {
         return Err(failure.unwrap_or_else(|| Error::internal("no scheme to try".to_owned())));
     };
-    let other = |(other, its_rows, _): (Reference, Sampled, Vec<f64>)| {
+    let other = |(other, its_rows, _): (Reference, Rows, Vec<f64>)| {
         format!(
             "{}: {:.1e} from the reference, own estimate {:.1e}",
             other.label,
@@ -146,7 +142,7 @@ fn find_reference(
 }
 
 /// Fluxes are compared relative to the largest of all of them.
-fn scale(rows: &Sampled) -> Vec<f64> {
+fn scale(rows: &Rows) -> Vec<f64> {
     let largest = rows.largest();
     let most = largest.iter().copied().fold(0.0, f64::max);
     vec![most; largest.len()]
@@ -183,7 +179,7 @@ pub(super) fn in_one_line(error: &Error) -> String {
 }
 
 /// Tractions or stresses along the path, and the counts.
-fn follow(driver: &Driver) -> Result<(Sampled, Vec<u64>), Error> {
+fn follow(driver: &Driver) -> Result<(Rows, Vec<u64>), Error> {
     let lengths = driver.point().segment_increments();
     let n = driver.point().law().n_components();
     let names = driver.point().columns()[n..2 * n].to_vec();
@@ -196,7 +192,7 @@ fn follow(driver: &Driver) -> Result<(Sampled, Vec<u64>), Error> {
     })?;
     let mut rows = rows.into_iter();
     let stretches = lengths.iter().map(|&n| rows.by_ref().take(n).collect());
-    let sampled = Sampled {
+    let sampled = Rows {
         names,
         stretches: stretches.collect(),
         zeros: Vec::new(),
@@ -205,7 +201,7 @@ fn follow(driver: &Driver) -> Result<(Sampled, Vec<u64>), Error> {
     Ok((sampled, counts.map(|n| n as u64).to_vec()))
 }
 
-fn measure(driver: &Driver, reference: &Sampled, scale: &[f64]) -> Result<Measurement, Error> {
+fn measure(driver: &Driver, reference: &Rows, scale: &[f64]) -> Result<Measurement, Error> {
     let (rows, counts) = follow(driver)?;
     let errors = rows.differences(reference, scale);
     let seconds = seconds_of_a_call(|| {

@@ -1,6 +1,7 @@
 //! How long trials probably take, from those that were measured.
 
-use super::trial::{Settings, Timing, repetitions};
+use super::settings::Settings;
+use crate::experiment::{Timing, repetitions};
 
 /// A mesh of half the size of elements takes this many times as long: four times the elements, with twice the bandwidth.
 const OF_A_DIVISION: i32 = 3;
@@ -30,12 +31,10 @@ impl Expected {
         let unlikeness = |other: &Settings| {
             let tolerances = [settings, other].map(|s| s.tolerance.unwrap_or(0.0));
             let differ = |is_other: bool| f64::from(u8::from(is_other));
-            let choices =
-                [settings, other].map(|s| s.solver.map(|choice| (choice.key, choice.value)));
             [
                 settings.division.abs_diff(other.division) as f64,
                 differ(settings.law != other.law),
-                differ(choices[0] != choices[1]),
+                differ(settings.solver != other.solver),
                 differ(tolerances[0].total_cmp(&tolerances[1]).is_ne()),
                 (settings.increments / other.increments).ln().abs(),
             ]

@@ -7,22 +7,22 @@
 //! the unit of a stiffness that scale the elastic operator.
 
 use super::case_study::refuse_without_probes;
-use super::progress::Pace;
-use super::sampled::Sampled;
-use super::scheme::{Values, short};
-use super::trial::{Scratch, Settings, Timing, measure};
-use super::write;
+use super::driver_study::in_one_line;
+use super::scheme::short;
+use super::settings::Settings;
 use crate::Error;
+use crate::experiment::progress::Pace;
+use crate::experiment::{Rows, Scratch, Timing, csv, measure, write};
 use crate::run::begin;
 use input::Case;
 use input::material::ParameterValue;
 use law::{BuiltLaw, Law, Operator, Stop};
 use mechanics::Simulation;
-use mechanics::equilibrium::Reuse;
 use mechanics::group::Group;
 use mechanics::mesh::Joint;
 use mechanics::problem::Formulation;
 use results::output_request::{Output, When};
+use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -42,7 +42,7 @@ pub(super) fn run(
     show: &mut dyn FnMut(&str),
     say: &mut dyn FnMut(&str),
 ) -> Result<(), Error> {
-    let (simulation, _) = begin(case, Reuse::default())?;
+    let (simulation, _) = begin(case)?;
     let groups = simulation.groups().iter().enumerate();
     let interfaces: Vec<(usize, &Group)> = groups
         .filter(|(_, group)| group.formulation == Formulation::ZeroThickness)
@@ -61,7 +61,7 @@ pub(super) fn run(
         let before = rows.len();
         interface.try_all(case, &scratch, say, |one| {
             rows.push(one);
-            write(&folder.join("interface_stiffness.csv"), &csv(&rows))
+            write(&folder.join("interface_stiffness.csv"), &csv_of(&rows)?)
         })?;
         text += &interface.table(name, &rows[before..]);
     }
@@ -153,7 +153,7 @@ impl<'a> Interface<'a> {
         mut done: impl FnMut(Tried) -> Result<(), Error>,
     ) -> Result<(), Error> {
         let mut pace = Pace::new(FACTORS.len() as f64);
-        let mut before: Option<Sampled> = None;
+        let mut before: Option<Rows> = None;
         for factor in FACTORS {
             say(&pace.line(&format!("interface stiffness, factor {}", short(factor))));
             let stiffness = self.unit.map(|unit| factor * unit);
@@ -172,7 +172,7 @@ impl<'a> Interface<'a> {
                 factor,
                 stiffness,
                 conditioning: self.conditioning(stiffness),
-                outcome: outcome.map_err(|error| super::driver_study::in_one_line(&error)),
+                outcome: outcome.map_err(|error| in_one_line(&error)),
             })?;
         }
         Ok(())
@@ -183,17 +183,13 @@ impl<'a> Interface<'a> {
         case: &Case,
         scratch: &Scratch,
         stiffness: [f64; 2],
-    ) -> Result<(Sampled, Answer), Error> {
-        let values: Values = self
-            .parameters
-            .iter()
-            .zip(stiffness)
-            .map(|((id, value, now), wanted)| {
-                (id.clone(), ParameterValue::Number(value * wanted / now))
-            })
-            .collect();
+    ) -> Result<(Rows, Answer), Error> {
+        let parameters = self.parameters.iter().zip(stiffness);
+        let values = parameters.map(|((id, value, now), wanted)| {
+            (id.clone(), ParameterValue::Number(value * wanted / now))
+        });
         let settings = Settings {
-            law: Some((self.law.clone(), values, String::new())),
+            law: Some((self.law.clone(), values.collect(), String::new())),
             ..Settings::default()
         };
         let mut case = settings.apply(case)?;
@@ -201,11 +197,11 @@ impl<'a> Interface<'a> {
             profile: When::Phases,
             ..Output::default()
         };
-        let trial = measure(&mut case, scratch, Timing::Once, &scratch.stop)?;
+        let trial = measure(case, scratch, Timing::Once)?;
         let pressure = largest_pressure(&scratch.folder().join("profile.csv"), &self.group.name)?;
         let answer = Answer {
             penetration: pressure / stiffness[0] / self.size,
-            iterations: trial.counts[0],
+            iterations: trial.counts.iterations,
             change: None,
         };
         Ok((trial.rows, answer))
@@ -303,30 +299,28 @@ fn plateau(tried: &[Tried]) -> String {
     )
 }
 
-fn csv(rows: &[Tried]) -> String {
-    let mut text =
-        String::from("group,factor,k_n,k_t,penetration,conditioning,iterations,change,failure\n");
-    for one in rows {
-        let [k_n, k_t] = one.stiffness;
-        let (cells, failure) = match &one.outcome {
-            Ok(a) => {
-                let change = a.change.map(|c| format!("{c:e}")).unwrap_or_default();
-                let (penetration, iterations) = (a.penetration, a.iterations);
-                let conditioning = one.conditioning;
-                (
-                    format!("{penetration:e},{conditioning:e},{iterations},{change}"),
-                    String::new(),
-                )
+const COLUMNS: &str = "group,factor,k_n,k_t,penetration,conditioning,iterations,change,failure";
+
+fn csv_of(rows: &[Tried]) -> Result<String, Error> {
+    let cells = |one: &Tried| {
+        let mut cells = vec![one.group.clone(), one.factor.to_string()];
+        cells.extend(one.stiffness.map(|k| format!("{k:e}")));
+        match &one.outcome {
+            Ok(answer) => cells.extend([
+                format!("{:e}", answer.penetration),
+                format!("{:e}", one.conditioning),
+                answer.iterations.to_string(),
+                answer.change.map(|c| format!("{c:e}")).unwrap_or_default(),
+                String::new(),
+            ]),
+            Err(failure) => {
+                cells.extend([const { String::new() }; 4]);
+                cells.push(failure.replace(['"', ',', '\n'], " "));
             }
-            Err(failure) => (",,,".to_owned(), failure.replace(['"', ',', '\n'], " ")),
-        };
-        let _ = writeln!(
-            text,
-            "{},{},{k_n:e},{k_t:e},{cells},{failure}",
-            one.group, one.factor
-        );
-    }
-    text
+        }
+        cells
+    };
+    csv(COLUMNS.split(','), rows.iter().map(cells))
 }
 
 /// The elastic operator under an isotropic compression (an interface: a normal one), row-major.
@@ -446,20 +440,21 @@ fn add_diagonals(
     }
 }
 
+/// A row of a profile.
+#[derive(Deserialize)]
+struct OfProfile {
+    group: String,
+    traction_n: Option<f64>,
+}
+
 /// The largest compression of a group in a profile, kPa.
 fn largest_pressure(path: &Path, group: &str) -> Result<f64, Error> {
     let broken = |error: csv::Error| Error::internal(format!("{}: {error}", path.display()));
-    let mut reader = csv::Reader::from_path(path).map_err(broken)?;
-    let headers = reader.headers().map_err(broken)?.clone();
-    let column = |name: &str| headers.iter().position(|header| header == name);
-    let (Some(of), Some(traction)) = (column("group"), column("traction_n")) else {
-        return Err(Error::internal(format!("{}: columns", path.display())));
-    };
     let mut largest = 0.0;
-    for row in reader.records() {
-        let row = row.map_err(broken)?;
-        if &row[of] == group {
-            largest = f64::max(largest, -row[traction].parse().unwrap_or(0.0));
+    for row in csv::Reader::from_path(path).map_err(broken)?.deserialize() {
+        let row: OfProfile = row.map_err(broken)?;
+        if row.group == group {
+            largest = f64::max(largest, -row.traction_n.unwrap_or(0.0));
         }
     }
     Ok(largest)

@@ -2,26 +2,28 @@
 //! against.
 
 use super::pareto::front;
-use super::sampled::{Convergence, Sampled, worst};
+use crate::experiment::Rows;
+use crate::experiment::rows::{Convergence, worst};
+use serde::Serialize;
 
 /// The settings of one driver or case.
 #[derive(Clone, Debug)]
-pub struct Study {
+pub(super) struct Study {
     /// Name of the case or driver, with its variant.
-    pub name: String,
+    pub(super) name: String,
     /// Title.
-    pub title: String,
+    pub(super) title: String,
     /// Names of the values whose errors are measured.
-    pub columns: Vec<String>,
+    pub(super) columns: Vec<String>,
     /// Names of the counts.
-    pub counts: &'static [&'static str],
+    pub(super) counts: &'static [&'static str],
     /// References for errors. The first holds for settings that leave the model (mesh, elements)
     /// unchanged.
-    pub references: Vec<Reference>,
+    pub(super) references: Vec<Reference>,
     /// Settings.
-    pub rows: Vec<Row>,
+    pub(super) rows: Vec<Row>,
     /// What the reader should know.
-    pub notes: Vec<String>,
+    pub(super) notes: Vec<String>,
 }
 
 /// Takes a study whenever a row is done.
@@ -29,45 +31,45 @@ pub(super) type Done<'a> = dyn FnMut(&Study) -> Result<(), crate::Error> + 'a;
 
 /// A reference for errors.
 #[derive(Clone, Debug)]
-pub struct Reference {
+pub(super) struct Reference {
     /// Settings in words.
-    pub label: String,
+    pub(super) label: String,
     /// The next finest settings in words.
-    pub next: String,
+    pub(super) next: String,
     /// How far it is converged.
-    pub convergence: Convergence,
+    pub(super) convergence: Convergence,
 }
 
 /// A setting.
-#[derive(Clone, Debug)]
-pub struct Row {
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Row {
     /// What varies.
-    pub family: String,
+    pub(super) family: String,
     /// The setting in words.
-    pub label: String,
+    pub(super) label: String,
     /// It is what the file asks for.
-    pub is_default: bool,
+    pub(super) is_default: bool,
     /// Number of the reference.
-    pub reference: usize,
+    pub(super) reference: usize,
     /// What became of it, or why it failed.
-    pub outcome: Result<Measurement, String>,
+    pub(super) outcome: Result<Measurement, String>,
 }
 
 /// Error and cost.
-#[derive(Clone, Debug)]
-pub struct Measurement {
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Measurement {
     /// CPU time, s.
-    pub seconds: f64,
+    pub(super) seconds: f64,
     /// Counts, in the order of the study's names.
-    pub counts: Vec<u64>,
+    pub(super) counts: Vec<u64>,
     /// Relative errors, in the order of the study's columns.
-    pub errors: Vec<f64>,
+    pub(super) errors: Vec<f64>,
     /// The largest of them.
-    pub error: f64,
+    pub(super) error: f64,
     /// The error is below the uncertainty of the reference, and cannot be told from 0.
-    pub is_below: bool,
+    pub(super) is_below: bool,
     /// No setting with the same reference is cheaper and as accurate.
-    pub is_optimal: bool,
+    pub(super) is_optimal: bool,
 }
 
 /// The count of rows that a setting gives, where settings differ in it.
@@ -89,7 +91,7 @@ impl Measurement {
 
 impl Reference {
     /// From three runs, coarse to fine, and the labels of the last two.
-    pub(super) fn new(labels: [String; 2], runs: [&Sampled; 3], scale: &[f64]) -> Self {
+    pub(super) fn new(labels: [String; 2], runs: [&Rows; 3], scale: &[f64]) -> Self {
         let [next, label] = labels;
         Self {
             label,
@@ -99,7 +101,7 @@ impl Reference {
     }
 
     /// Its name and convergence, in one line.
-    pub fn statement(&self) -> String {
+    pub(super) fn statement(&self) -> String {
         let Convergence {
             difference,
             order,
@@ -159,13 +161,13 @@ impl Study {
     }
 
     /// Settings that ran, with this reference.
-    pub fn measured(&self, reference: usize) -> impl Iterator<Item = (&Row, &Measurement)> {
+    pub(super) fn measured(&self, reference: usize) -> impl Iterator<Item = (&Row, &Measurement)> {
         let rows = self.rows.iter().filter(move |r| r.reference == reference);
         rows.filter_map(|row| Some((row, row.outcome.as_ref().ok()?)))
     }
 
     /// Rank of the default, in one sentence.
-    pub fn verdict(&self) -> String {
+    pub(super) fn verdict(&self) -> String {
         let Some((row, default)) = self.measured(0).find(|(row, _)| row.is_default) else {
             return "default: no result".to_owned();
         };

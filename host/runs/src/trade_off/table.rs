@@ -1,13 +1,15 @@
-//! A study as a table: on a terminal, and as comma-separated values.
+//! A study as a table: on a terminal, as comma-separated values, and on a page.
 
-use super::study::{Row, Study};
+use super::study::{Reference, Row, Study};
+use crate::Error;
+use crate::experiment::{csv, page};
+use minijinja::value::Serde;
+use minijinja::{Value, context};
 use std::fmt::Write as _;
-use std::path::Path;
-use text::write::begin;
 
 impl Study {
     /// The table for a terminal, with what it says.
-    pub fn text(&self) -> String {
+    pub(super) fn text(&self) -> String {
         let mut text = format!("{}: {}\n", self.name, self.title);
         for (number, reference) in self.references.iter().enumerate() {
             let what = if number == 0 {
@@ -44,58 +46,76 @@ impl Study {
         text
     }
 
-    /// Writes the rows.
+    /// The table as comma-separated values.
     ///
     /// # Errors
-    /// The file cannot be written.
-    pub(super) fn write_csv(&self, path: &Path) -> Result<(), csv::Error> {
-        let mut writer = csv::Writer::from_writer(begin(path)?);
-        let fixed = [
-            "family",
-            "setting",
-            "default",
-            "reference",
-            "error",
-            "below_uncertainty",
-            "optimal",
-            "cpu_seconds",
+    /// [`text::Error::Internal`].
+    pub(super) fn csv(&self) -> Result<String, Error> {
+        let fixed = "family,setting,default,reference,error,below_uncertainty,optimal,cpu_seconds";
+        let mut columns: Vec<String> = fixed.split(',').map(str::to_owned).collect();
+        columns.extend(self.counts.iter().map(|&count| count.to_owned()));
+        columns.extend(self.columns.iter().map(|name| format!("error_{name}")));
+        columns.push("failure".to_owned());
+        csv(columns, self.rows.iter().map(|row| self.cells(row)))
+    }
+
+    fn cells(&self, row: &Row) -> Vec<String> {
+        let reference = self.references.get(row.reference);
+        let label = reference.map(|reference| reference.label.clone());
+        let mut cells = vec![
+            row.family.clone(),
+            row.label.clone(),
+            row.is_default.to_string(),
+            label.unwrap_or_default(),
         ];
-        let errors = self.columns.iter().map(|name| format!("error_{name}"));
-        let header = fixed.iter().map(|name| (*name).to_owned());
-        let counts = self.counts.iter().map(|name| (*name).to_owned());
-        let failure = std::iter::once("failure".to_owned());
-        writer.write_record(header.chain(counts).chain(errors).chain(failure))?;
-        for row in &self.rows {
-            let reference = self.references.get(row.reference);
-            let label = reference.map(|reference| reference.label.clone());
-            let mut cells = vec![
-                row.family.clone(),
-                row.label.clone(),
-                row.is_default.to_string(),
-                label.unwrap_or_default(),
-            ];
-            match &row.outcome {
-                Ok(m) => {
-                    // Without a reference so far there is no error to tell.
-                    let error = reference.map(|_| format!("{:e}", m.error));
-                    cells.push(error.unwrap_or_default());
-                    cells.push(m.is_below.to_string());
-                    cells.push(m.is_optimal.to_string());
-                    cells.push(format!("{:e}", m.seconds));
-                    cells.extend(m.counts.iter().map(u64::to_string));
-                    cells.extend(m.errors.iter().map(|error| format!("{error:e}")));
-                    cells.push(String::new());
-                }
-                Err(failure) => {
-                    let empty = 4 + self.counts.len() + self.columns.len();
-                    cells.extend(std::iter::repeat_n(String::new(), empty));
-                    cells.push(failure.clone());
-                }
+        match &row.outcome {
+            Ok(m) => {
+                // Without a reference so far there is no error to tell.
+                let error = reference.map(|_| format!("{:e}", m.error));
+                cells.push(error.unwrap_or_default());
+                cells.extend([m.is_below, m.is_optimal].map(|is| is.to_string()));
+                cells.push(format!("{:e}", m.seconds));
+                cells.extend(m.counts.iter().map(u64::to_string));
+                cells.extend(m.errors.iter().map(|error| format!("{error:e}")));
+                cells.push(String::new());
             }
-            writer.write_record(&cells)?;
+            Err(failure) => {
+                let empty = 4 + self.counts.len() + self.columns.len();
+                cells.extend(std::iter::repeat_n(String::new(), empty));
+                cells.push(failure.clone());
+            }
         }
-        writer.flush()?;
-        Ok(())
+        cells
+    }
+
+    /// The page, in the style of the reports.
+    ///
+    /// # Errors
+    /// [`text::Error::Internal`].
+    pub(super) fn page(&self, diagram: &str) -> Result<String, Error> {
+        let part = |(number, reference): (usize, &Reference)| {
+            let rows = self.rows.iter().filter(|row| row.reference == number);
+            context! {
+                heading => if number == 0 { "Settings" } else { "Mesh and elements" },
+                statement => reference.statement(),
+                rows => Value::from(Serde(rows.collect::<Vec<_>>())),
+            }
+        };
+        let title = if self.title.is_empty() {
+            &self.name
+        } else {
+            &self.title
+        };
+        let contents = context! {
+            title => title.clone(),
+            verdict => self.verdict(),
+            notes => self.notes.clone(),
+            diagram,
+            counts => self.counts.to_vec(),
+            columns => self.columns.clone(),
+            parts => self.references.iter().enumerate().map(part).collect::<Vec<_>>(),
+        };
+        page(include_str!("page.html"), contents)
     }
 }
 

@@ -6,8 +6,8 @@
 //! the order alone. Increments must differ in all three for each phase that is not linear: two, one and again one
 //! increment in a phase give no more than two runs do.
 
-use super::super::sampled::NOISE;
-use super::super::trial::Trial;
+use crate::experiment::Trial;
+use crate::experiment::rows::NOISE;
 
 /// Bounds of the order that is extrapolated with. A larger one is not relied on.
 pub(super) const ORDERS: [f64; 2] = [0.3, 1.0];
@@ -64,7 +64,7 @@ impl Levels {
     /// How many of the three finest cut steps back.
     pub(super) fn cut_back(&self) -> usize {
         let finest = self.runs.iter().rev().take(3);
-        finest.filter(|(_, run)| run.cut_backs() > 0).count()
+        finest.filter(|(_, run)| run.counts.cut_backs > 0).count()
     }
 
     /// The value by which the two finest differ most.
@@ -181,15 +181,15 @@ fn order([a, b, c]: [f64; 3], [coarse, fine]: [f64; 2]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::sampled::Sampled;
     use super::*;
+    use crate::experiment::{Counts, Rows};
     use approx::assert_relative_eq;
 
     /// Runs to the value 1 with an error n^−p.
     fn levels(order: f64, divisions: &[f64]) -> Levels {
         let mut levels = Levels::default();
         for &n in divisions {
-            let rows = Sampled {
+            let rows = Rows {
                 names: vec!["f".to_owned()],
                 stretches: vec![vec![vec![1.0 - n.powf(-order)]]],
                 zeros: Vec::new(),
@@ -197,7 +197,7 @@ mod tests {
             let trial = Trial {
                 rows,
                 seconds: 0.0,
-                counts: Vec::new(),
+                counts: Counts::default(),
                 linear: Vec::new(),
             };
             levels.push(n, trial);
@@ -243,7 +243,7 @@ mod tests {
         let of = |values: [f64; 3]| {
             let mut levels = Levels::default();
             for (n, value) in [1.0, 2.0, 4.0].into_iter().zip(values) {
-                let rows = Sampled {
+                let rows = Rows {
                     names: vec!["f".to_owned()],
                     stretches: vec![vec![vec![value]]],
                     zeros: Vec::new(),
@@ -251,7 +251,7 @@ mod tests {
                 let trial = Trial {
                     rows,
                     seconds: 0.0,
-                    counts: Vec::new(),
+                    counts: Counts::default(),
                     linear: Vec::new(),
                 };
                 levels.push(n, trial);
@@ -272,7 +272,7 @@ mod tests {
         let of = |increments: [[usize; 2]; 3], is_linear: bool| {
             let mut levels = Levels::of_increments();
             for (n, phases) in [1.0, 2.0, 4.0].into_iter().zip(increments) {
-                let rows = Sampled {
+                let rows = Rows {
                     names: vec!["f".to_owned()],
                     stretches: phases.map(|n| vec![vec![1.0]; n]).to_vec(),
                     zeros: Vec::new(),
@@ -280,7 +280,7 @@ mod tests {
                 let trial = Trial {
                     rows,
                     seconds: 0.0,
-                    counts: Vec::new(),
+                    counts: Counts::default(),
                     linear: vec![is_linear, false],
                 };
                 levels.push(n, trial);
@@ -297,7 +297,7 @@ mod tests {
     fn runs_that_cut_steps_back_are_counted_among_those_that_tell_the_error() {
         let mut runs = levels(1.0, &[4.0, 8.0, 16.0, 32.0]);
         for ((_, run), cut_backs) in runs.runs.iter_mut().zip([3, 0, 2, 1]) {
-            run.counts = vec![10, 10, 10, cut_backs];
+            run.counts.cut_backs = cut_backs;
         }
         assert_eq!(runs.cut_back(), 2);
     }

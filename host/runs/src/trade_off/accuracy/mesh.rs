@@ -1,11 +1,12 @@
 //! The error of the mesh, from uniform refinements.
 
-use super::super::progress::in_words;
-use super::super::trial::{Settings, Timing};
+use super::super::settings::Settings;
 use super::levels::{Levels, ORDERS};
 use super::search::Search;
 use super::{STUDY, messages};
 use crate::Error;
+use crate::experiment::Timing;
+use crate::experiment::progress::in_words;
 use input::accuracy_settings::ChosenMesh;
 use std::time::Duration;
 
@@ -38,19 +39,14 @@ pub(super) fn refine(
     settings: Settings,
     most: f64,
 ) -> Result<(Settings, ChosenMesh), Error> {
-    let own = search
-        .scratch
-        .trial(search.case, &settings, Timing::Once, 0)?;
+    let own = search.trials.run(&settings, Timing::Once, 0)?;
     let mut left = f64::max(BUDGET * own.seconds, LEAST_BUDGET);
     let (mut last, mut dearer) = (own.seconds, DEARER);
     let mut levels = Levels::default();
     levels.push(1.0, own);
     let mut why = None;
     for division in DIVISIONS {
-        let finer = Settings {
-            division,
-            ..settings.clone()
-        };
+        let finer = settings.clone().divided(division);
         let expected = last * dearer;
         if expected > left {
             why = Some(messages::too_long(division, [expected, left].map(in_words)));
@@ -58,8 +54,8 @@ pub(super) fn refine(
         }
         search.begin(&finer, Some([expected, left]));
         let within = Timing::Within(Duration::from_secs_f64(left));
-        let outcome = search.scratch.trial(search.case, &finer, within, 0);
-        search.scratch.stop.check(STUDY)?;
+        let outcome = search.trials.run(&finer, within, 0);
+        search.trials.stop.check(STUDY)?;
         let trial = match outcome {
             Ok(trial) => trial,
             Err(error) => {
@@ -97,11 +93,5 @@ pub(super) fn refine(
         worst,
         estimate,
     };
-    Ok((
-        Settings {
-            division,
-            ..settings
-        },
-        chosen,
-    ))
+    Ok((settings.divided(division), chosen))
 }

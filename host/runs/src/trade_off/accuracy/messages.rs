@@ -1,7 +1,7 @@
 //! What a study for an accuracy says.
 
-use super::super::progress::in_words;
 use super::STUDY;
+use crate::experiment::progress::in_words;
 use input::accuracy_settings::{AccuracySettings, FailedTrial, Verdict};
 use std::fmt::Write;
 

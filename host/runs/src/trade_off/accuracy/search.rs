@@ -2,16 +2,18 @@
 
 use super::super::case_study::{LONG, law_schemes};
 use super::super::driver_study::in_one_line;
-use super::super::progress::in_words;
 use super::super::scheme::Scheme;
-use super::super::trial::{Scratch, Settings, Timing, Trial};
+use super::super::settings::Settings;
+use super::super::trials::Trials;
 use super::STUDY;
 use super::levels::{Levels, ORDERS};
 use super::messages;
 use super::table::Table;
 use crate::Error;
+use crate::experiment::progress::in_words;
+use crate::experiment::{Timing, Trial};
+use input::Kind;
 use input::accuracy_settings::FailedTrial;
-use input::{Case, Kind};
 use std::time::Instant;
 
 /// Factors of the file's increments.
@@ -48,8 +50,7 @@ pub(super) struct Found {
 
 /// A study on its way.
 pub(super) struct Search<'a> {
-    pub(super) case: &'a Case,
-    pub(super) scratch: &'a Scratch,
+    pub(super) trials: &'a Trials<'a>,
     /// The error that increments and tolerance may have.
     pub(super) asked: f64,
     pub(super) runs: usize,
@@ -79,19 +80,16 @@ impl Search<'_> {
             Vec::new()
         } else {
             (self.say)(&format!("{STUDY}: which schemes of the laws there are"));
-            law_schemes(self.case, self.scratch)?
+            law_schemes(self.trials)?
         };
         let others = schemes.iter().filter(|(_, s)| s.is_finest && !s.is_default);
         for (law, scheme) in others {
-            let settings = Settings {
-                law: Some(scheme.of(law)),
-                ..Settings::default()
-            };
+            let settings = Settings::default().with_scheme(law, scheme);
             // More increments than the best so far needs do not pay.
             let cheap = WORTH_A_CHANGE * best.1.trial.seconds;
             let limit = good(&best.1).then_some(cheap);
             let found = self.with(&settings, f64::max(best.1.factor, 1.0), limit);
-            self.scratch.stop.check(STUDY)?;
+            self.trials.stop.check(STUDY)?;
             let Ok(found) = found else {
                 continue;
             };
@@ -101,11 +99,7 @@ impl Search<'_> {
             }
         }
         let (settings, found) = best;
-        let settings = Settings {
-            increments: found.factor,
-            ..settings
-        };
-        Ok((settings, found))
+        Ok((settings.with_increments(found.factor), found))
     }
 
     /// Doubles increments until the finest run is good enough, or the coarsest takes more seconds than the
@@ -118,11 +112,8 @@ impl Search<'_> {
         let mut last: Option<(f64, f64)> = None;
         let factors = FACTORS.into_iter().filter(|f| *f <= f64::max(most, 2.0));
         for factor in factors.clone() {
-            let settings = Settings {
-                increments: factor,
-                ..settings.clone()
-            };
-            let phases = settings.apply(self.case)?.file.phases;
+            let settings = settings.clone().with_increments(factor);
+            let phases = settings.apply(self.trials.case)?.file.phases;
             let increments: Vec<usize> = phases.iter().map(|p| *p.increments.get_ref()).collect();
             if increments == last_increments {
                 continue;
@@ -132,7 +123,7 @@ impl Search<'_> {
             let left = last.map(|(of, took)| [factor, rest].map(|more| took * more / of));
             self.begin(&settings, left);
             let started = Instant::now();
-            let outcome = self.scratch.trial(self.case, &settings, Timing::Once, 0);
+            let outcome = self.trials.run(&settings, Timing::Once, 0);
             match self.passed_over(&settings, outcome)? {
                 Ok(trial) => {
                     last = Some((factor, trial.seconds));
@@ -255,21 +246,20 @@ impl Search<'_> {
         if found.error.is_none_or(|error| error > self.asked) {
             return Ok((settings, 0.0));
         }
-        let given = self.case.file.solver.get_ref().force_tolerance;
+        let given = self.trials.case.file.solver.get_ref().force_tolerance;
         for tolerance in TOLERANCES.into_iter().filter(|t| *t > given) {
-            let loose = Settings {
-                tolerance: Some(tolerance),
-                ..settings.clone()
-            };
+            let loose = settings.clone().with_tolerance(tolerance);
             self.begin(&loose, None);
-            let outcome = self.scratch.trial(self.case, &loose, Timing::Once, 0);
+            let outcome = self.trials.run(&loose, Timing::Once, 0);
             let Ok(trial) = self.passed_over(&loose, outcome)? else {
                 continue;
             };
             let change = trial.rows.difference(&found.trial.rows, &found.scale);
             let told = [Some(change), found.error.map(|error| error + change)];
             self.table.row((self.runs, &loose), Ok(&trial), told)?;
-            if change <= SHARES[1] * self.asked && trial.counts[0] < found.trial.counts[0] {
+            if change <= SHARES[1] * self.asked
+                && trial.counts.iterations < found.trial.counts.iterations
+            {
                 return Ok((loose, change));
             }
         }

@@ -1,10 +1,10 @@
 //! The runs of the study for an accuracy, as a table.
 
 use super::super::driver_study::in_one_line;
-use super::super::trial::{Settings, Trial};
+use super::super::settings::Settings;
 use crate::Error;
+use crate::experiment::{Trial, write};
 use std::path::{Path, PathBuf};
-use text::write::replace;
 
 /// `accuracy.csv`: a row for every run of the study.
 pub(super) struct Table {
@@ -38,7 +38,7 @@ impl Table {
             Ok(trial) => format!(
                 "{run},{label},{:e},{},{},{},\n",
                 trial.seconds,
-                trial.counts[0],
+                trial.counts.iterations,
                 number(change),
                 number(error)
             ),
@@ -49,6 +49,6 @@ impl Table {
     }
 
     fn write(&self) -> Result<(), Error> {
-        Ok(replace(&self.path, &self.text)?)
+        write(&self.path, &self.text)
     }
 }

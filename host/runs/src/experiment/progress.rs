@@ -4,7 +4,7 @@ use std::time::Instant;
 
 /// Work done and to do, in any one unit.
 #[derive(Debug)]
-pub(super) struct Pace {
+pub(crate) struct Pace {
     started: Instant,
     done: f64,
     all: f64,
@@ -12,7 +12,7 @@ pub(super) struct Pace {
 
 impl Pace {
     /// Nothing done yet.
-    pub(super) fn new(all: f64) -> Self {
+    pub(crate) fn new(all: f64) -> Self {
         Self {
             started: Instant::now(),
             done: 0.0,
@@ -20,18 +20,13 @@ impl Pace {
         }
     }
 
-    /// There is more to do than was known.
-    pub(super) fn add(&mut self, more: f64) {
-        self.all += more;
-    }
-
     /// A piece is done.
-    pub(super) fn did(&mut self, piece: f64) {
+    pub(crate) fn did(&mut self, piece: f64) {
         self.done += piece;
     }
 
     /// The current activity, with the remaining time at this pace.
-    pub(super) fn line(&self, doing: &str) -> String {
+    pub(crate) fn line(&self, doing: &str) -> String {
         let rest = (self.all - self.done) / self.done;
         if !rest.is_finite() || rest <= 0.0 {
             return doing.to_owned();
@@ -42,7 +37,7 @@ impl Pace {
 }
 
 /// A length of time, as well as it is known.
-pub(super) fn in_words(seconds: f64) -> String {
+pub(crate) fn in_words(seconds: f64) -> String {
     if seconds < 100.0 {
         format!("{:.0} s", seconds.max(1.0))
     } else if seconds < 6000.0 {
@@ -58,13 +53,13 @@ mod tests {
 
     #[test]
     fn the_time_left_is_in_proportion_to_what_is_left() {
-        let mut pace = Pace::new(1.0);
+        let mut pace = Pace::new(3.0);
         assert_eq!(pace.line("a"), "a");
         pace.started -= std::time::Duration::from_secs(30);
         pace.did(1.0);
-        assert_eq!(pace.line("b"), "b");
-        pace.add(2.0);
-        assert_eq!(pace.line("c"), "c (about 60 s left)");
+        assert_eq!(pace.line("b"), "b (about 60 s left)");
+        pace.did(2.0);
+        assert_eq!(pace.line("c"), "c");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 /// CPU time of the process so far, all threads together, s; wall-clock time if the system does not
 /// report it.
 #[cfg(unix)]
-pub(super) fn cpu_seconds() -> f64 {
+pub(crate) fn cpu_seconds() -> f64 {
     use rustix::time::{ClockId, clock_gettime};
     let time = clock_gettime(ClockId::ProcessCPUTime);
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
@@ -12,7 +12,7 @@ pub(super) fn cpu_seconds() -> f64 {
 /// CPU time of the process so far, all threads together, s; wall-clock time if the system does not
 /// report it.
 #[cfg(not(unix))]
-pub(super) fn cpu_seconds() -> f64 {
+pub(crate) fn cpu_seconds() -> f64 {
     use std::sync::OnceLock;
     use std::time::Instant;
     static START: OnceLock<Instant> = OnceLock::new();
@@ -29,7 +29,7 @@ const LONG: f64 = 0.2;
 const MOST_REPETITIONS: f64 = 1e4;
 
 /// CPU time of one call, s: the least mean over batches of repeated calls.
-pub(super) fn seconds_of_a_call<E>(mut call: impl FnMut() -> Result<(), E>) -> Result<f64, E> {
+pub(crate) fn seconds_of_a_call<E>(mut call: impl FnMut() -> Result<(), E>) -> Result<f64, E> {
     let mut timed = |times: usize| {
         let start = cpu_seconds();
         for _ in 0..times {

@@ -1,20 +1,25 @@
 //! Results along a path, how far two of them differ, and how far the finest of them is converged.
 
+use super::bits;
+use serde::{Deserialize, Serialize};
+
 /// Values along a path.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Sampled {
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Rows {
     /// Names of the values.
     pub(crate) names: Vec<String>,
     /// Values by stretch (segment or phase) and increment; NaN where absent.
+    #[serde(with = "bits")]
     pub(crate) stretches: Vec<Vec<Vec<f64>>>,
     /// For every value the magnitude up to which it is zero, but for what round-off and the tolerance of equilibrium
     /// leave; none is where absent of these.
+    #[serde(with = "bits")]
     pub(crate) zeros: Vec<f64>,
 }
 
-impl Sampled {
+impl Rows {
     /// The largest magnitude of every value; 0 of those that are [zero](Self::zeros).
-    pub(super) fn largest(&self) -> Vec<f64> {
+    pub(crate) fn largest(&self) -> Vec<f64> {
         let mut largest = vec![0.0_f64; self.names.len()];
         for row in self.stretches.iter().flatten() {
             for (largest, value) in largest.iter_mut().zip(row) {
@@ -30,7 +35,7 @@ impl Sampled {
     }
 
     /// Names of the values that never differ from zero by more than that.
-    pub(super) fn zero(&self) -> Vec<String> {
+    pub(crate) fn zero(&self) -> Vec<String> {
         let has_value = |column: usize| {
             let mut rows = self.stretches.iter().flatten();
             rows.any(|row| row[column].is_finite())
@@ -42,7 +47,7 @@ impl Sampled {
 
     /// The largest difference of every value over the rows that both paths have, relative to
     /// `scale`; 0 where the scale is 0.
-    pub(super) fn differences(&self, other: &Self, scale: &[f64]) -> Vec<f64> {
+    pub(crate) fn differences(&self, other: &Self, scale: &[f64]) -> Vec<f64> {
         let mut differences = vec![0.0_f64; scale.len()];
         for (ours, theirs) in self.stretches.iter().zip(&other.stretches) {
             for (i, j) in common_rows(ours.len(), theirs.len()) {
@@ -65,13 +70,13 @@ impl Sampled {
     }
 
     /// The largest of the [`Self::differences`].
-    pub(super) fn difference(&self, other: &Self, scale: &[f64]) -> f64 {
+    pub(crate) fn difference(&self, other: &Self, scale: &[f64]) -> f64 {
         worst(&self.differences(other, scale))
     }
 }
 
 /// The largest of some errors.
-pub(super) fn worst(errors: &[f64]) -> f64 {
+pub(crate) fn worst(errors: &[f64]) -> f64 {
     errors.iter().copied().fold(0.0, f64::max)
 }
 
@@ -93,25 +98,25 @@ fn greatest_common_divisor(a: usize, b: usize) -> usize {
 const ROUND_OFF: f64 = 1e-13;
 /// Differences below this come from round-off and from the tolerances of equilibrium; no order can
 /// be read from them.
-pub(super) const NOISE: f64 = 1e-9;
+pub(crate) const NOISE: f64 = 1e-9;
 /// An order below this counts as this one: the estimate grows without bound towards order 0.
 const LEAST_ORDER: f64 = 0.1;
 
 /// How far the finest of three runs, each of half the step of the one before, is converged.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Convergence {
+pub(crate) struct Convergence {
     /// Largest relative difference of the finest and the next finest.
-    pub difference: f64,
+    pub(crate) difference: f64,
     /// Order that the three show; none if the differences are noise, or if there are only two.
-    pub order: Option<f64>,
+    pub(crate) order: Option<f64>,
     /// Relative error of the finest: the difference itself, more where the order is below 1, the
     /// larger of both differences where they are noise.
-    pub uncertainty: f64,
+    pub(crate) uncertainty: f64,
 }
 
 impl Convergence {
     /// From the differences coarse to middle, and middle to fine.
-    pub(super) fn of(coarse_to_middle: Option<f64>, middle_to_fine: f64) -> Self {
+    pub(crate) fn of(coarse_to_middle: Option<f64>, middle_to_fine: f64) -> Self {
         let difference = middle_to_fine;
         let order = coarse_to_middle
             .filter(|coarse| *coarse > NOISE && difference > NOISE)
@@ -135,7 +140,7 @@ impl Convergence {
     }
 
     /// From three runs, coarse to fine.
-    pub(super) fn of_runs([coarse, middle, fine]: [&Sampled; 3], scale: &[f64]) -> Self {
+    pub(crate) fn of_runs([coarse, middle, fine]: [&Rows; 3], scale: &[f64]) -> Self {
         Self::of(
             Some(coarse.difference(middle, scale)),
             middle.difference(fine, scale),
@@ -148,9 +153,9 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    fn path(n: usize, f: impl Fn(f64) -> f64) -> Sampled {
+    fn path(n: usize, f: impl Fn(f64) -> f64) -> Rows {
         let row = |i: usize| vec![f(i as f64 / n as f64)];
-        Sampled {
+        Rows {
             names: vec!["f".to_owned()],
             stretches: vec![(1..=n).map(row).collect()],
             zeros: Vec::new(),
@@ -159,14 +164,14 @@ mod tests {
 
     #[test]
     fn what_is_round_off_of_larger_values_has_no_scale() {
-        let noise = |seed: f64| Sampled {
+        let noise = |seed: f64| Rows {
             zeros: vec![1e-8],
             ..path(4, |s| 1e-14 * (seed * s).sin())
         };
         let (a, b) = (noise(100.0), noise(300.0));
         assert_eq!(a.zero(), ["f"]);
         assert_relative_eq!(a.difference(&b, &a.largest()), 0.0);
-        let small = Sampled {
+        let small = Rows {
             zeros: vec![1e-8],
             ..path(4, |s| 2e-8 * s)
         };
