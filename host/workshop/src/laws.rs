@@ -2,7 +2,7 @@
 
 use crate::Error;
 use abi::Hypothesis;
-use law::adapter::{self, Foreign, conventions};
+use law::foreign::{self, Foreign, conventions};
 use law::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, LoadedLaw, Opener, Origin,
     ParameterDescription, SearchPath, Tangent,
@@ -147,10 +147,10 @@ fn sidecars(search: &SearchPath) -> Vec<(PathBuf, Result<LawDescription, law::Er
         paths.sort();
         for path in paths {
             if path.to_string_lossy().ends_with(DLL_SUFFIX)
-                && let Some(sidecar) = adapter::sidecar_of(&path)
+                && let Some(sidecar) = foreign::sidecar_of(&path)
             {
                 let read = Source::read(&sidecar).map_err(law::Error::from);
-                found.push((path, read.and_then(|source| adapter::sidecar(&source))));
+                found.push((path, read.and_then(|source| foreign::sidecar(&source))));
             }
         }
     }

@@ -2,7 +2,7 @@
 //! filled in. It can be used as it is written.
 
 use crate::Error;
-use law::adapter::UMAT_SYMBOLS;
+use law::foreign::UMAT_SYMBOLS;
 use law::inspect;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -51,7 +51,7 @@ impl NewSidecar {
         };
         let text = self.text(&identifier(&name), &hypotheses, symbol);
         // What is written is what will be read.
-        law::adapter::sidecar(&Source::new(&out, text.clone()))?;
+        law::foreign::sidecar(&Source::new(&out, text.clone()))?;
         if out.exists() {
             let message = format!("{} is there already; `--out` names another", out.display());
             return Err(Error::usage(message));

@@ -1,21 +1,27 @@
 //! Repeating the call of a capsule: what comes out, how far the increment can be followed, and
 //! whether the tangent is the derivative of the update.
 
-pub(crate) mod library;
-pub(crate) mod probed;
+mod library;
+mod probed;
 
-use crate::Error;
+pub(crate) use probed::shown;
+
 use crate::check::recheck;
+use crate::scratch::Scratch;
+use crate::{Error, internal};
 use abi::status::Outcome;
 use law::capsule::{Capsule, LibraryCapsule, OutcomePart, status};
+use law::child::{self, Ending, Work};
 use law::{
     BatchFailure, End, Law, LoadedLaw, Opener, Operator, PointCall, Request, SearchPath, Start,
     Strided, words,
 };
+use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::path::Path;
 use std::time::{Duration, Instant};
-use text::Source;
+use text::write::replace;
+use text::{Source, file};
 
 /// Smallest fraction of the increment that is tried.
 const SMALLEST: f64 = 1.0 / (1 << 20) as f64;
@@ -29,24 +35,167 @@ const DIFFERENCES: [f64; 3] = [1e-3, 1e-5, 1e-7];
 /// Fluxes, internal variables, operator.
 type Answer = (Vec<f64>, Vec<f64>, Vec<f64>);
 
-/// Repeats the call of a capsule and reports on it.
+/// How far a process has come that repeats a capsule, for the one that has started it.
+#[derive(Debug, Serialize, Deserialize)]
+enum Reached {
+    /// The program has refused to do so, in its words.
+    Refused(String),
+    /// The law or the library has done its part.
+    Returned,
+    /// It has, and nothing is wrong.
+    Faultless,
+}
+
+/// Report of a replay: words for people, and a file for the process that has started it.
+struct Report<'a> {
+    say: &'a mut dyn FnMut(&str),
+    file: Option<&'a Path>,
+    has_returned: bool,
+}
+
+impl<'a> Report<'a> {
+    fn new(say: &'a mut dyn FnMut(&str), file: Option<&'a Path>) -> Self {
+        Self {
+            say,
+            file,
+            has_returned: false,
+        }
+    }
+
+    fn say(&mut self, words: &str) {
+        (self.say)(words);
+    }
+
+    fn reached(&mut self, what: &Reached) -> Result<(), Error> {
+        self.has_returned = true;
+        if let Some(file) = self.file {
+            replace(file, serde_json::to_string(what).map_err(internal)?)?;
+        }
+        Ok(())
+    }
+
+    /// Says how it crashed, and what is recorded if that is something else.
+    fn compared(&mut self, recorded: &OutcomePart, crash: &str) {
+        if crash == recorded.message {
+            self.say(&format!("as recorded: `internal`: {crash}"));
+        } else {
+            self.say(&format!("outcome   `internal`: {crash}"));
+            let OutcomePart {
+                status, message, ..
+            } = recorded;
+            self.say(&format!("recorded  `{status}`: {message}"));
+        }
+    }
+}
+
+/// Whether a law or all of a library is called.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Called {
+    Law,
+    Library,
+}
+
+/// Outcome of a process that repeats a capsule.
+pub(crate) struct There {
+    /// Its output.
+    said: String,
+    is_faultless: bool,
+    is_stuck: bool,
+    /// How the law or the library has ended it, if it has.
+    pub(crate) crash: Option<String>,
+}
+
+impl Called {
+    /// How it has ended its process, in words.
+    pub(crate) fn ends(self, ending: Ending) -> String {
+        let what = match self {
+            Self::Law => "the law",
+            Self::Library => "the library",
+        };
+        match ending {
+            Ending::TimedOut => format!("{what} does not return"),
+            Ending::Signal(_) => format!("{what} crashed: {ending}"),
+            Ending::Exited(_) => format!("{what} ended its process: {ending}"),
+        }
+    }
+
+    /// Does what a capsule says in another process.
+    ///
+    /// # Errors
+    /// There is no process, or the capsule cannot be used.
+    pub(crate) fn elsewhere(self, capsule: &Path, limit: Duration) -> Result<There, Error> {
+        let scratch = Scratch::new()?;
+        let reached = scratch.path().join("reached");
+        let mut arguments = vec!["replay".into(), capsule.into(), "--in-process".into()];
+        arguments.extend(["--reached".into(), reached.clone().into()]);
+        let outcome = child::run(&Work {
+            arguments,
+            folder: None,
+            variables: Vec::new(),
+            time: limit,
+            memory: None,
+        })
+        .map_err(internal)?;
+        let reached = file::read_text(&reached).ok();
+        let reached: Option<Reached> = reached.and_then(|text| serde_json::from_slice(&text).ok());
+        let has_returned = match (&reached, outcome.ending) {
+            (Some(Reached::Refused(why)), Ending::Exited(_)) => return Err(Error::usage(why)),
+            (Some(Reached::Returned | Reached::Faultless), Ending::Exited(code)) => {
+                // A law that fails is an error; a library may end the process when all is done.
+                self == Self::Law || code == 0
+            }
+            _ => false,
+        };
+        Ok(There {
+            said: String::from_utf8_lossy(&outcome.stdout).into_owned(),
+            is_faultless: matches!(reached, Some(Reached::Faultless)),
+            is_stuck: outcome.ending == Ending::TimedOut,
+            crash: (!has_returned).then(|| self.ends(outcome.ending)),
+        })
+    }
+}
+
+/// Repeats the call of a capsule and reports on it; in a file, too, how far that has come.
 ///
 /// # Errors
 /// The capsule or its law cannot be used; or, after the report, the call fails as before:
 /// [`Error::CallFails`].
-pub fn replay(path: &Path, opener: &Opener, say: &mut dyn FnMut(&str)) -> Result<(), Error> {
+pub fn replay(
+    path: &Path,
+    opener: &Opener,
+    reached: Option<&Path>,
+    say: &mut dyn FnMut(&str),
+) -> Result<(), Error> {
+    let mut report = Report::new(say, reached);
+    let done = replayed(path, opener, &mut report);
+    if let Err(why) = &done
+        && !report.has_returned
+    {
+        let why = why.shown(false);
+        let why = why.trim_start_matches("error: ").trim().to_owned();
+        report.reached(&Reached::Refused(why))?;
+    }
+    done
+}
+
+fn replayed(path: &Path, opener: &Opener, report: &mut Report<'_>) -> Result<(), Error> {
     let source = Source::read(path)?;
     if let Some(capsule) = LibraryCapsule::of_source(&source)? {
-        return library::replay(path, &capsule, opener, say);
+        return library::replay(path, &capsule, opener, report);
     }
     let capsule = Capsule::of_source(source)?;
     if capsule.probe.is_some() {
-        return probed::replay(path, &capsule, opener, say);
+        return probed::replay(path, &capsule, opener, report);
     }
     let loaded = find(&capsule, opener)?;
-    repeat(&capsule, &loaded, say)?;
+    repeated(&capsule, &loaded, report)?;
     // The call succeeds: whether that is what a check has found wrong is for the check to say.
-    recheck::ask(path, &capsule, (loaded.library().path(), opener), say)
+    recheck::ask(
+        path,
+        &capsule,
+        (loaded.library().path(), opener),
+        report.say,
+    )
 }
 
 /// Repeats the call with this law.
@@ -56,8 +205,12 @@ pub fn repeat(
     loaded: &LoadedLaw,
     say: &mut dyn FnMut(&str),
 ) -> Result<(), Error> {
+    repeated(capsule, loaded, &mut Report::new(say, None))
+}
+
+fn repeated(capsule: &Capsule, loaded: &LoadedLaw, report: &mut Report<'_>) -> Result<(), Error> {
     let description = loaded.description();
-    say(&format!(
+    report.say(&format!(
         "law `{}` {} of {}, {}",
         description.id,
         description.version,
@@ -65,15 +218,15 @@ pub fn repeat(
         capsule.law.hypothesis
     ));
     if loaded.library().sha256() != capsule.law.sha256 {
-        say(&format!(
+        report.say(&format!(
             "this is another library than that of the capsule: version {}, SHA-256 {}",
             capsule.law.version, capsule.law.sha256
         ));
     }
-    say(&from(&capsule.origin));
+    report.say(&from(&capsule.origin));
     let law = build(capsule, loaded)?;
-    let outcome = compare(capsule, &law, say);
-    law.take_notes().iter().for_each(|note| say(note));
+    let outcome = compare(capsule, &law, report);
+    law.take_notes().iter().for_each(|note| report.say(note));
     outcome
 }
 
@@ -87,34 +240,38 @@ fn from<'a>(origin: impl IntoIterator<Item = (&'a String, &'a toml::Value)>) -> 
 }
 
 /// Repeats the call and says what came out.
-fn compare(capsule: &Capsule, law: &Law, say: &mut dyn FnMut(&str)) -> Result<(), Error> {
+fn compare(capsule: &Capsule, law: &Law, report: &mut Report<'_>) -> Result<(), Error> {
     let call = capsule.point_call(law)?;
     if call.request == Request::InitialState {
-        return match law.initial_state(1, (&call.flux, Strided::rows(call.flux.len()))) {
+        let state = law.initial_state(1, call.as_start().flux);
+        report.reached(&Reached::Returned)?;
+        return match state {
             Ok(state) => {
-                say("the law starts from this state");
-                say(&values(law, &[], &state));
+                report.say("the law starts from this state");
+                report.say(&values(law, &[], &state));
                 Ok(())
             }
-            Err(failure) => outcome(capsule, law, &failure, say),
+            Err(failure) => outcome(capsule, law, &failure, report),
         };
     }
-    let failure = match update(law, &call, call.request, 1.0) {
+    let updated = update(law, &call, call.request, 1.0);
+    report.reached(&Reached::Returned)?;
+    let failure = match updated {
         Ok((flux, state, _)) => {
-            say(&format!(
+            report.say(&format!(
                 "the call succeeds; it is recorded as `{}`: {}",
                 capsule.outcome.status, capsule.outcome.message
             ));
-            say(&values(law, &flux, &state));
-            say(&tangent(law, &call, 1.0));
+            report.say(&values(law, &flux, &state));
+            report.say(&tangent(law, &call, 1.0));
             return Ok(());
         }
         Err(failure) => failure,
     };
-    let outcome = outcome(capsule, law, &failure, say);
+    let outcome = outcome(capsule, law, &failure, report);
     let succeeds = |fraction| update(law, &call, call.request, fraction).is_ok();
-    if let Some(fraction) = bisect(succeeds, say) {
-        say(&tangent(law, &call, fraction));
+    if let Some(fraction) = bisect(succeeds, report) {
+        report.say(&tangent(law, &call, fraction));
     }
     outcome
 }
@@ -155,15 +312,23 @@ fn build(capsule: &Capsule, loaded: &LoadedLaw) -> Result<Law, Error> {
         let message = format!("there is no hypothesis `{}`", capsule.law.hypothesis);
         capsule.error(&["law", "hypothesis"], message)
     })?;
-    let ids = loaded.description().parameters.iter();
-    let ids = ids.map(|p| p.id.as_str());
-    let parameters = capsule.in_order(&capsule.parameters, ids, &["parameters"], "parameter")?;
+    let parameters = parameters(capsule, loaded)?;
     loaded.build(hypothesis, &parameters).map_err(|failure| {
         Error::library(format!(
             "law `{}` refuses its parameters: {}",
             capsule.law.id, failure.reason
         ))
     })
+}
+
+/// The parameters of a capsule in the order of the law's.
+///
+/// # Errors
+/// One is missing, or unknown to the law.
+pub(crate) fn parameters(capsule: &Capsule, law: &LoadedLaw) -> Result<Vec<f64>, law::Error> {
+    let parameters = law.description().parameters.iter();
+    let ids = parameters.map(|p| p.id.as_str());
+    capsule.in_order(&capsule.parameters, ids, &["parameters"], "parameter")
 }
 
 /// The call, over a fraction of the increment.
@@ -174,11 +339,11 @@ fn update(
     fraction: f64,
 ) -> Result<Answer, BatchFailure> {
     let gradient_end = if fraction < 1.0 {
-        let ends = call.gradient.iter().zip(&call.gradient_end);
+        let ends = call.start.gradient0.iter().zip(&call.start.gradient1);
         ends.map(|(start, end)| start + fraction * (end - start))
             .collect()
     } else {
-        call.gradient_end.clone()
+        call.start.gradient1.clone()
     };
     // The time as it was recorded, bit for bit, for the whole increment.
     let time_increment = fraction * call.time_increment;
@@ -201,15 +366,9 @@ fn update_to(
     let (mut flux, mut state) = (vec![0.0; n], vec![0.0; law.n_states()]);
     let mut matrix = vec![0.0; n * n];
     let start = Start {
-        n_points: 1,
-        gradient: (&call.gradient, rows),
         gradient_end: (gradient_end, rows),
-        flux: (&call.flux, rows),
-        state: &call.state,
-        time: call.time,
         time_increment,
-        moment: call.moment,
-        sites: &[call.site],
+        ..call.as_start()
     };
     let end = End {
         flux: (&mut flux, rows),
@@ -225,7 +384,7 @@ fn outcome(
     capsule: &Capsule,
     law: &Law,
     failure: &BatchFailure,
-    say: &mut dyn FnMut(&str),
+    report: &mut Report<'_>,
 ) -> Result<(), Error> {
     let found = OutcomePart::of(failure);
     let words = |part: &OutcomePart| {
@@ -247,10 +406,10 @@ fn outcome(
         && message(&found) == message(&capsule.outcome)
         && found.step_factor.map(f64::to_bits) == capsule.outcome.step_factor.map(f64::to_bits);
     if same {
-        say(&format!("as recorded: {}", words(&found)));
+        report.say(&format!("as recorded: {}", words(&found)));
     } else {
-        say(&format!("outcome   {}", words(&found)));
-        say(&format!("recorded  {}", words(&capsule.outcome)));
+        report.say(&format!("outcome   {}", words(&found)));
+        report.say(&format!("recorded  {}", words(&capsule.outcome)));
     }
     let cannot_follow = !law.breaks_down(failure)
         && matches!(
@@ -265,7 +424,7 @@ fn outcome(
 }
 
 /// The largest fraction of the increment that succeeds, found by halving.
-fn bisect(succeeds: impl Fn(f64) -> bool, say: &mut dyn FnMut(&str)) -> Option<f64> {
+fn bisect(succeeds: impl Fn(f64) -> bool, report: &mut Report<'_>) -> Option<f64> {
     let started = Instant::now();
     let mut good = 0.5;
     let mut bad = 1.0;
@@ -273,7 +432,7 @@ fn bisect(succeeds: impl Fn(f64) -> bool, say: &mut dyn FnMut(&str)) -> Option<f
         bad = good;
         good *= 0.5;
         if good < SMALLEST || started.elapsed() > PATIENCE {
-            say(&format!(
+            report.say(&format!(
                 "every fraction of the increment fails that was tried, down to {bad:.1e}"
             ));
             return None;
@@ -290,7 +449,7 @@ fn bisect(succeeds: impl Fn(f64) -> bool, say: &mut dyn FnMut(&str)) -> Option<f
             bad = middle;
         }
     }
-    say(&format!(
+    report.say(&format!(
         "a fraction {good:.12} of the increment succeeds, {bad:.12} fails"
     ));
     Some(good)
@@ -305,7 +464,7 @@ fn tangent(law: &Law, call: &PointCall, fraction: f64) -> String {
         Err(failure) => return format!("no tangent to compare: {}", failure.message),
     };
     let largest = matrix.iter().fold(0.0_f64, |max, v| max.max(v.abs()));
-    let ends = call.gradient.iter().zip(&call.gradient_end);
+    let ends = call.start.gradient0.iter().zip(&call.start.gradient1);
     let end: Vec<f64> = ends
         .clone()
         .map(|(start, end)| start + fraction * (end - start))

@@ -1,10 +1,11 @@
 //! The author's own path: the increments of a driver file are what the checks are made with.
 
+use super::points::at_rest;
 use super::specimen::{Specimen, create_form};
-use super::{Found, Subject, Verdict, failed, routine, skipped};
+use super::{Found, Subject, Verdict, failed, routine, skipped, warned};
 use crate::Error;
 use input::driver::Driver;
-use law::adapter::Foreign;
+use law::foreign::Foreign;
 use law::probe::PointStart;
 use law::{LoadedLaw, Opener};
 use std::path::Path;
@@ -22,7 +23,7 @@ pub(super) fn driver_fits(subject: &Subject) -> Found {
     let Some(path) = &subject.driver else {
         return Ok(String::new());
     };
-    let drivers = read(&subject.opener, path).map_err(|why| Verdict::Warning(why.to_string()))?;
+    let drivers = read(&subject.opener, path).map_err(|why| warned(why.to_string()))?;
     let canonical = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
     for driver in &drivers {
         let law = driver.point().law();
@@ -148,12 +149,7 @@ impl Subject {
                     None => courses.push((time, vec![start])),
                 }
             }
-            last = Some(PointStart {
-                gradient0: row.gradient.to_vec(),
-                gradient1: row.gradient.to_vec(),
-                flux0: row.flux.to_vec(),
-                state0: row.internal.to_vec(),
-            });
+            last = Some(at_rest(row.gradient, row.flux, row.internal));
         });
         let law = point.law();
         let loaded = self.loaded(driver)?;

@@ -1,14 +1,19 @@
 //! Do the functions answer as the contract says, to the host's mistakes too?
 
+use super::draw::{Draw, draw_all};
 use super::loading_path::Refused;
+use super::points::{UPDATE, first_difference};
 use super::random::Random;
-use super::specimen::{Draw, create_form, draw_all, first_difference, hypotheses};
-use super::{Check, Family, Found, Subject, Verdict, author_path, failed, refusal, status_name};
+use super::specimen::{Specimen, create_form, hypotheses};
+use super::verdict::Outcome::{Failed, Skipped};
+use super::{
+    Check, Family, Found, Subject, Verdict, author_path, failed, refusal, skipped, status_name,
+};
 use abi::raw;
 use abi::status::{Outcome, most_severe};
 use abi::version::BATCH_SIZE_1_0;
-use law::LoadedLaw;
-use law::probe::{Answer, BATCH_BYTES, CreateForm, Created, Form, NO_OUTCOME, Order};
+use law::probe::{Answer, BATCH_BYTES, CreateForm, Created, Form, NO_OUTCOME, Order, PointStart};
+use law::{LoadedLaw, ParameterDescription};
 
 pub(super) const CHECKS: &[Check] = &[
     Check {
@@ -113,11 +118,7 @@ fn create_works(subject: &Subject) -> Found {
     for law in subject.laws()? {
         law.destroy_nothing();
     }
-    let sets: Vec<String> = specimens
-        .iter()
-        .step_by(2)
-        .map(super::specimen::Specimen::name)
-        .collect();
+    let sets: Vec<String> = specimens.iter().step_by(2).map(Specimen::name).collect();
     Ok(sets.join("; "))
 }
 
@@ -128,23 +129,17 @@ fn must_refuse(
     created: &Created,
     expected: raw::Status,
 ) -> Result<String, Verdict> {
-    let id = &law.description().id;
+    let fault = |why: &str| failed(format!("`{}`: {what}: {why}", law.description().id));
     if created.status != expected {
-        return Err(failed(format!(
-            "`{id}`: {what}: `create` returned {}, expected {}",
-            status_name(created.status),
-            status_name(expected)
-        )));
+        let (found, expected) = (status_name(created.status), status_name(expected));
+        let why = format!("`create` returned {found}, expected {expected}");
+        return Err(fault(&why));
     }
     if created.probe.is_some() {
-        return Err(failed(format!(
-            "`{id}`: {what}: `out` is written all the same"
-        )));
+        return Err(fault("`out` is written all the same"));
     }
-    match created.text() {
-        Some(text) if !text.is_empty() => Ok(text),
-        _ => Err(failed(format!("`{id}`: {what}: there is no message"))),
-    }
+    let text = created.text().filter(|text| !text.is_empty());
+    text.ok_or_else(|| fault("there is no message"))
 }
 
 fn wrong_arguments_are_refused(subject: &Subject) -> Found {
@@ -154,41 +149,41 @@ fn wrong_arguments_are_refused(subject: &Subject) -> Found {
             let values = draw_all(subject, &law, &mut random, Draw::Ordinary);
             let right = create_form(&formulation, hypothesis, &values);
             let more: Vec<f64> = values.iter().copied().chain([1.0]).collect();
-            let mut wrong = vec![
+            let fewer = values.split_last().map(|(_, fewer)| fewer);
+            let wrong = [
                 (
                     "formulation 4294967295",
-                    CreateForm {
+                    Some(CreateForm {
                         formulation: u32::MAX,
                         ..right
-                    },
+                    }),
                 ),
                 (
                     "a value too many",
-                    CreateForm {
+                    Some(CreateForm {
                         values: Some(&more),
                         n_values: more.len(),
                         ..right
-                    },
+                    }),
                 ),
-            ];
-            if let Some((_, fewer)) = values.split_last() {
-                wrong.push((
+                (
                     "a value too few",
-                    CreateForm {
+                    fewer.map(|fewer| CreateForm {
                         values: Some(fewer),
                         n_values: fewer.len(),
                         ..right
-                    },
-                ));
-                wrong.push((
+                    }),
+                ),
+                (
                     "values at null",
-                    CreateForm {
+                    fewer.map(|_| CreateForm {
                         values: None,
                         ..right
-                    },
-                ));
-            }
+                    }),
+                ),
+            ];
             for (what, form) in wrong {
+                let Some(form) = form else { continue };
                 must_refuse(&law, what, &law.probe(&form)?, raw::PILUM_E_ARGUMENT)?;
                 let mute = law.probe(&CreateForm {
                     message: None,
@@ -207,11 +202,43 @@ fn wrong_arguments_are_refused(subject: &Subject) -> Found {
     Ok(String::new())
 }
 
+/// Values of a parameter that are just outside its bounds or no numbers, and those at the bounds.
+fn around_bounds(p: &ParameterDescription) -> [Vec<f64>; 2] {
+    let b = p.bounds;
+    let mut outside = vec![f64::INFINITY, f64::NEG_INFINITY];
+    if !p.optional {
+        outside.push(f64::NAN);
+    }
+    let mut at = Vec::new();
+    for (bound, is_open, beyond, within) in [
+        (
+            b.lower,
+            b.open_lower,
+            b.lower.next_down(),
+            b.lower.next_up(),
+        ),
+        (
+            b.upper,
+            b.open_upper,
+            b.upper.next_up(),
+            b.upper.next_down(),
+        ),
+    ] {
+        if bound.is_finite() {
+            outside.push(if is_open { bound } else { beyond });
+            at.push(if is_open { within } else { bound });
+        }
+    }
+    if !p.choices.is_empty() {
+        outside.extend([-1.0, 0.5, p.choices.len() as f64]);
+    }
+    [outside, at]
+}
+
 fn bounds_are_kept(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "bounds");
-    let mut n = 0;
-    for specimen in subject.specimens(1, &mut random)? {
+    let n = subject.each("bounds", 1, |specimen, _| {
         let law = &specimen.law;
+        let mut n = 0;
         for (i, p) in law.description().parameters.iter().enumerate() {
             let create = |value: f64| {
                 let mut values = specimen.values.clone();
@@ -222,41 +249,10 @@ fn bounds_are_kept(subject: &Subject) -> Found {
                     &values,
                 ))
             };
-            let b = p.bounds;
-            let mut outside = vec![f64::INFINITY, f64::NEG_INFINITY];
-            if !p.optional {
-                outside.push(f64::NAN);
-            }
-            let mut at = Vec::new();
-            if b.lower.is_finite() {
-                outside.push(if b.open_lower {
-                    b.lower
-                } else {
-                    b.lower.next_down()
-                });
-                at.push(if b.open_lower {
-                    b.lower.next_up()
-                } else {
-                    b.lower
-                });
-            }
-            if b.upper.is_finite() {
-                outside.push(if b.open_upper {
-                    b.upper
-                } else {
-                    b.upper.next_up()
-                });
-                at.push(if b.open_upper {
-                    b.upper.next_down()
-                } else {
-                    b.upper
-                });
-            }
-            if !p.choices.is_empty() {
-                outside.extend([-1.0, 0.5, p.choices.len() as f64]);
-            }
+            let [outside, at] = around_bounds(p);
+            n += outside.len() + at.len();
             for value in outside {
-                let what = format!("{} = {value:e}, bounds {b}", p.id);
+                let what = format!("{} = {value:e}, bounds {}", p.id, p.bounds);
                 let text = must_refuse(law, &what, &create(value)?, raw::PILUM_E_PARAMETER)?;
                 if text.split_once(':').is_none_or(|(id, _)| id.trim() != p.id) {
                     return Err(failed(format!(
@@ -265,7 +261,6 @@ fn bounds_are_kept(subject: &Subject) -> Found {
                         p.id
                     )));
                 }
-                n += 1;
             }
             for value in at {
                 let created = create(value)?;
@@ -273,17 +268,16 @@ fn bounds_are_kept(subject: &Subject) -> Found {
                     let what = format!("{} = {value:e}", p.id);
                     must_refuse(law, &what, &created, raw::PILUM_E_PARAMETER)?;
                 }
-                n += 1;
             }
         }
-    }
+        Ok(n)
+    })?;
     Ok(format!("{n} values"))
 }
 
 fn initial_states_are_written(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "initial states");
-    let mut n_points = 0;
-    for specimen in subject.specimens(2, &mut random)? {
+    let n = subject.each("initial states", 2, |specimen, random| {
+        let mut n_points = 0;
         // One point without any flux, and so many under pressure.
         for n in [0, 1, 2, 5, 16, 33] {
             let pressures = (0..n).map(|_| random.logarithmic(1.0, 1000.0));
@@ -291,7 +285,6 @@ fn initial_states_are_written(subject: &Subject) -> Found {
             if n == 0 {
                 fluxes.push(specimen.under_pressure(0.0));
             }
-            let n = fluxes.len();
             for order in [Order::Points, Order::Components, Order::Spread] {
                 let form = Form {
                     order,
@@ -300,44 +293,51 @@ fn initial_states_are_written(subject: &Subject) -> Found {
                 let Some(answer) = specimen.probe.init_state(&fluxes, &form)? else {
                     continue;
                 };
-                for (i, end) in answer.points.iter().enumerate() {
-                    let point = format!("`init_state`, point {i} of {n}, flux {:?}", fluxes[i]);
-                    if end.status == NO_OUTCOME && answer.status != raw::PILUM_E_ARGUMENT {
-                        let why = format!("{point}: there is no outcome");
-                        return Err(specimen.fails_to_start(&fluxes, &form, &[], why));
-                    }
-                    let unwritten = end.state.iter().position(|value| !value.is_finite());
-                    if let Some(k) = unwritten
-                        && end.status == raw::PILUM_OK
-                    {
-                        let id = &specimen.formulation.internal_variables[k].id;
-                        let why = format!("{point}: `{id}` is not written, or not finite");
-                        return Err(specimen.fails_to_start(&fluxes, &form, &[], why));
-                    }
-                    n_points += 1;
+                n_points += answer.points.len();
+                if let Some((i, what)) = unwritten(specimen, &answer) {
+                    let why = format!(
+                        "`init_state`, point {i} of {}, flux {:?}: {what}",
+                        fluxes.len(),
+                        fluxes[i]
+                    );
+                    return Err(specimen.fails_to_start(&fluxes, &form, &[], why));
                 }
             }
         }
-    }
-    if n_points == 0 {
+        Ok(n_points)
+    })?;
+    Ok(if n == 0 {
         // No reason to skip what builds on this.
-        return Ok("no law has `init_state`".to_owned());
-    }
-    Ok(format!("{n_points} points"))
+        "no law has `init_state`".to_owned()
+    } else {
+        format!("{n} points")
+    })
+}
+
+/// The first point with something that `init_state` has not written, and what that is.
+fn unwritten(specimen: &Specimen, answer: &Answer) -> Option<(usize, String)> {
+    let mut points = answer.points.iter().enumerate();
+    points.find_map(|(i, end)| {
+        if end.status == NO_OUTCOME && answer.status != raw::PILUM_E_ARGUMENT {
+            return Some((i, "there is no outcome".to_owned()));
+        }
+        let k = end.state.iter().position(|value| !value.is_finite())?;
+        let id = &specimen.formulation.internal_variables[k].id;
+        (end.status == raw::PILUM_OK).then(|| (i, format!("`{id}` is not written, or not finite")))
+    })
 }
 
 fn integrate_works(subject: &Subject) -> Found {
     author_path::is_followed(subject)?;
-    let mut random = Random::new(subject.seed, "integrate");
-    let (mut n_successes, mut n) = (0, 0);
-    for specimen in subject.specimens(2, &mut random)? {
-        let walk = specimen
-            .walk(12, &mut random)
-            .map_err(|verdict| match verdict {
-                // A law that starts nowhere does not work.
-                Verdict::Skipped(why) => Verdict::Failed(why),
-                other => other,
-            })?;
+    let mut n_successes = 0;
+    let n = subject.each("integrate", 2, |specimen, random| {
+        let walk = specimen.walk(12, random).map_err(|mut verdict| {
+            // A law that starts nowhere does not work.
+            if verdict.outcome == Skipped {
+                verdict.outcome = Failed;
+            }
+            verdict
+        })?;
         for Refused { status, text, .. } in &walk.refusals {
             let expected = matches!(
                 Outcome::from_code(*status),
@@ -345,42 +345,52 @@ fn integrate_works(subject: &Subject) -> Found {
             );
             if !expected {
                 let why = refusal(*status, Some(text));
-                return Err(specimen.fails(format!("a small step gave {why}")));
+                return Err(specimen.fails(format_args!("a small step gave {why}")));
             }
         }
         if walk.successes.is_empty() {
-            return Err(specimen.fails(format!("no step succeeded: {}", walk.why())));
+            return Err(specimen.fails(format_args!("no step succeeded: {}", walk.why())));
         }
         n_successes += walk.successes.len();
-        n += walk.successes.len() + walk.refusals.len();
         // One call that is looked at as a whole.
-        let points = specimen.points(7, &mut random)?;
+        let points = specimen.points(7, random)?;
         let answer = specimen.call(&points, raw::PILUM_REQ_FLUX)?;
-        let worst = answer
-            .points
-            .iter()
-            .fold(raw::PILUM_OK, |worst, end| most_severe(worst, end.status));
+        let statuses = answer.points.iter().map(|end| end.status);
+        let worst = statuses.fold(raw::PILUM_OK, most_severe);
         if worst != answer.status {
-            return Err(specimen.fails(format!(
+            return Err(specimen.fails(format_args!(
                 "the call returned {}, its most severe outcome is {}",
                 status_name(answer.status),
                 status_name(worst)
             )));
         }
-    }
+        Ok(walk.successes.len() + walk.refusals.len())
+    })?;
     Ok(format!("{n_successes} of {n} steps succeeded"))
 }
 
+/// Looks at every law under every hypothesis with ordinary parameters, and at some points that it follows.
+fn each_with_points(
+    subject: &Subject,
+    name: &str,
+    n_points: usize,
+    mut look: impl FnMut(&Specimen, Vec<PointStart>) -> Result<(), Verdict>,
+) -> Found {
+    subject.each(name, 1, |specimen, random| {
+        look(specimen, specimen.points(n_points, random)?)?;
+        Ok(0)
+    })?;
+    Ok(String::new())
+}
+
 fn unknown_requests_are_refused(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "requests");
-    for specimen in subject.specimens(1, &mut random)? {
-        let points = specimen.points(3, &mut random)?;
+    each_with_points(subject, "requests", 3, |specimen, points| {
         // A law knows of rates, and may refuse them as unknown or as what it does not offer.
         let rates = (!specimen.formulation.rates).then_some(3);
         for bit in rates.into_iter().chain([4, 17, 31]) {
             let answer = specimen.call(&points, raw::PILUM_REQ_FLUX | 1 << bit)?;
             if answer.status != raw::PILUM_E_UNSUPPORTED {
-                return Err(specimen.fails(format!(
+                return Err(specimen.fails(format_args!(
                     "request bit {bit}: `integrate` returned {}",
                     status_name(answer.status)
                 )));
@@ -389,60 +399,56 @@ fn unknown_requests_are_refused(subject: &Subject) -> Found {
                 return Err(specimen.fails("a call that is refused as a whole wrote outcomes"));
             }
         }
-    }
-    Ok(String::new())
+        Ok(())
+    })
 }
 
 fn missing_tangent_is_refused(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "no tangent");
-    let mut n = 0;
-    for specimen in subject.specimens(1, &mut random)? {
+    let n = subject.each("no tangent", 1, |specimen, random| {
         if specimen.formulation.tangent != law::Tangent::None {
-            continue;
+            return Ok(0);
         }
-        let points = specimen.points(3, &mut random)?;
         let form = Form {
             verbatim: true,
-            ..Form::of(raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT)
+            ..Form::of(UPDATE)
         };
+        let points = specimen.points(3, random)?;
         let answer = specimen.probe.integrate(&points, &form)?;
         if answer.status != raw::PILUM_E_UNSUPPORTED {
-            return Err(specimen.fails(format!(
+            return Err(specimen.fails(format_args!(
                 "it declares no tangent, but asked for one `integrate` returned {}",
                 status_name(answer.status)
             )));
         }
-        n += 1;
-    }
+        Ok(1)
+    })?;
     if n == 0 {
-        return Err(super::skipped("all laws have a tangent"));
+        return Err(skipped("all laws have a tangent"));
     }
     Ok(String::new())
 }
 
 fn empty_batch_is_accepted(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "empty");
-    for specimen in subject.specimens(1, &mut random)? {
-        let answer = specimen.call(&[], raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT)?;
+    subject.each("empty", 1, |specimen, _| {
+        let answer = specimen.call(&[], UPDATE)?;
         let init = specimen.probe.init_state(&[], &Form::of(0))?;
         for (function, answer) in [("integrate", Some(answer)), ("init_state", init)] {
             if let Some(Answer { status, .. }) = answer
                 && status != raw::PILUM_OK
             {
-                return Err(
-                    specimen.fails(format!("`{function}` returned {}", status_name(status)))
-                );
+                let status = status_name(status);
+                return Err(specimen.fails(format_args!("`{function}` returned {status}")));
             }
         }
-    }
+        Ok(0)
+    })?;
     Ok(String::new())
 }
 
 fn null_outcomes_are_accepted(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "null");
-    for specimen in subject.specimens(2, &mut random)? {
-        let points = specimen.points(16, &mut random)?;
-        let form = Form::of(raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT);
+    subject.each("null", 2, |specimen, random| {
+        let points = specimen.points(16, random)?;
+        let form = Form::of(UPDATE);
         let with = specimen.probe.integrate(&points, &form)?;
         let mute = Form {
             outcomes: false,
@@ -456,87 +462,97 @@ fn null_outcomes_are_accepted(subject: &Subject) -> Found {
         for (end, told) in without.points.iter_mut().zip(&with.points) {
             end.status = told.status;
         }
-        if let Some(i) = first_difference(&with.points, &without.points) {
-            return Err(specimen.fails(format!("the results of point {i} differ")));
+        match first_difference(&with.points, &without.points) {
+            Some(i) => Err(specimen.fails(format_args!("the results of point {i} differ"))),
+            None => Ok(0),
         }
-    }
+    })?;
     Ok(String::new())
 }
 
 fn messages_fit(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "messages");
-    for specimen in subject.specimens(1, &mut random)? {
-        let mut points = specimen.points(3, &mut random)?;
-        let good = points.clone();
+    each_with_points(subject, "messages", 3, |specimen, good| {
+        let mut points = good.clone();
         let last = points.len() - 1;
         points[last].gradient1[0] = f64::NAN;
+        let number = (40 + last).to_string();
         for capacity in [512, 16, 2, 1, 0] {
             let form = Form {
                 message: Some(capacity),
                 first_point: 40,
                 ..Form::of(raw::PILUM_REQ_FLUX)
             };
-            let answer = specimen.probe.integrate(&points, &form)?;
-            let Some(text) = answer.text() else {
-                if capacity == 0 {
-                    continue;
+            let why = match specimen.probe.integrate(&points, &form)?.text() {
+                None if capacity == 0 => continue,
+                None => format!("a message in {capacity} bytes does not end in NUL"),
+                Some(text) if capacity == 512 && text.is_empty() => {
+                    "a failing point leaves no message".to_owned()
                 }
-                return Err(
-                    specimen.fails(format!("a message in {capacity} bytes does not end in NUL"))
-                );
+                Some(text) if capacity == 512 && !text.contains(&number) => {
+                    format!("the message `{text}` does not name point {number}")
+                }
+                Some(_) => continue,
             };
-            if capacity == 512 && text.is_empty() {
-                return Err(specimen.fails("a failing point leaves no message"));
-            }
-            let number = (40 + last).to_string();
-            if capacity == 512 && !text.contains(&number) {
-                return Err(
-                    specimen.fails(format!("the message `{text}` does not name point {number}"))
-                );
-            }
+            return Err(specimen.fails(why));
         }
         let quiet = specimen.call(&good, raw::PILUM_REQ_FLUX)?;
         if quiet.text().is_none() {
             return Err(specimen.fails("a call without failures leaves a message without NUL"));
         }
+        Ok(())
+    })
+}
+
+/// Whether a law gives the same to a host with other structs: its name, and the forms of `create` and the batch.
+fn serves(
+    specimen: &Specimen,
+    points: &[PointStart],
+    host: &str,
+    (host_form, batch_bytes): (CreateForm<'_>, usize),
+) -> Result<(), Verdict> {
+    let form = Form::of(UPDATE);
+    let usual = specimen.probe.integrate(points, &form)?;
+    let created = specimen.law.probe(&host_form)?;
+    let Some(probe) = created.probe else {
+        let status = status_name(created.status);
+        return Err(specimen.fails(format_args!("`create` returned {status} to {host}")));
+    };
+    let other = Form {
+        batch_bytes,
+        ..form
+    };
+    let answer = probe.integrate(points, &other)?;
+    if batch_bytes < BATCH_BYTES && answer.status != usual.status {
+        return Err(specimen.fails(format_args!(
+            "a batch of {batch_bytes} bytes, as version 1.0 has it: `integrate` returned {}",
+            status_name(answer.status)
+        )));
     }
-    Ok(String::new())
+    let Some(i) = first_difference(&usual.points, &answer.points) else {
+        return Ok(());
+    };
+    let whose = if batch_bytes < BATCH_BYTES {
+        format!("to {host} the")
+    } else {
+        "the".to_owned()
+    };
+    Err(specimen.fails(format_args!("{whose} results of point {i} differ")))
 }
 
 fn longer_structs_are_accepted(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "longer");
-    for specimen in subject.specimens(1, &mut random)? {
-        let points = specimen.points(16, &mut random)?;
-        let form = Form::of(raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT);
-        let usual = specimen.probe.integrate(&points, &form)?;
-        let longer = Form {
-            batch_bytes: BATCH_BYTES + 64,
-            ..form
-        };
-        let later_host = CreateForm {
+    each_with_points(subject, "longer", 16, |specimen, points| {
+        let host = CreateForm {
             more_host: 64,
             host_minor: raw::PILUM_ABI_MINOR + 1,
-            ..create_form(&specimen.formulation, specimen.hypothesis, &specimen.values)
+            ..specimen.create_form()
         };
-        let created = specimen.law.probe(&later_host)?;
-        let Some(probe) = created.probe else {
-            return Err(specimen.fails(format!(
-                "`create` returned {} to a host of a later minor version",
-                status_name(created.status)
-            )));
-        };
-        let answer = probe.integrate(&points, &longer)?;
-        if let Some(i) = first_difference(&usual.points, &answer.points) {
-            return Err(specimen.fails(format!("the results of point {i} differ")));
-        }
-    }
-    Ok(String::new())
+        let what = "a host of a later minor version";
+        serves(specimen, &points, what, (host, BATCH_BYTES + 64))
+    })
 }
 
 fn shorter_batch_is_refused(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "shorter");
-    for specimen in subject.specimens(1, &mut random)? {
-        let points = specimen.points(3, &mut random)?;
+    each_with_points(subject, "shorter", 3, |specimen, points| {
         for batch_bytes in [BATCH_SIZE_1_0 - 8, 64, 8] {
             let form = Form {
                 batch_bytes,
@@ -544,12 +560,12 @@ fn shorter_batch_is_refused(subject: &Subject) -> Found {
             };
             let answer = specimen.probe.integrate(&points, &form)?;
             if answer.status != raw::PILUM_E_ARGUMENT {
-                return Err(specimen.fails(format!(
+                return Err(specimen.fails(format_args!(
                     "a batch of {batch_bytes} bytes: `integrate` returned {}",
                     status_name(answer.status)
                 )));
             }
         }
-    }
-    Ok(String::new())
+        Ok(())
+    })
 }

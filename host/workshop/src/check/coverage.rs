@@ -1,11 +1,11 @@
 //! How far do the paths of the checks lead a law? One that is only ever asked what is elastic passes them all.
 
-use super::loading_path::Step;
-use super::mathematics::{ELASTIC, NEEDS, ROUND_OFF, flux_scale, increment, largest};
-use super::random::Random;
+use super::loading_path::{Step, flux_scale, starts};
+use super::mathematics::NEEDS;
+use super::points::{ELASTIC, ROUND_OFF, bits, increment, largest};
 use super::specimen::Specimen;
-use super::{Check, Family, Found, Subject, Verdict, skipped};
-use law::probe::{PointEnd, PointStart};
+use super::{Check, Family, Found, Subject, Verdict, counted, skipped, warned};
+use law::probe::PointEnd;
 use std::fmt::Write as _;
 
 pub(super) const CHECKS: &[Check] = &[
@@ -29,33 +29,33 @@ pub(super) const CHECKS: &[Check] = &[
 ];
 
 fn results_do_not_blow_up(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "blow up");
-    let mut n = 0;
-    for specimen in subject.specimens_by_default(4, &mut random)? {
-        let walk = specimen.paths(N_FAR, &mut random)?;
-        n += walk.steps.len();
-        if let Some(step) = walk.blown_up {
-            let names = specimen.hypothesis.components().iter().copied();
-            let variables = specimen.formulation.internal_variables.iter();
-            let names = names.chain(variables.map(|v| v.id.as_str()));
-            let values = step.end.flux.iter().chain(&step.end.state);
-            let before = step.start.flux0.iter().chain(&step.start.state0);
-            let all = names.zip(before.zip(values));
-            let worst = all.max_by(|(_, (_, a)), (_, (_, b))| a.abs().total_cmp(&b.abs()));
-            let (name, (before, after)) = worst.unwrap_or(("n", (&0.0, &0.0)));
-            let why = format!(
-                "it has blown up: `{name}` goes from {before:e} to {after:e} in an increment. A scheme that is not \
-                 stable over it asks for a smaller one (PILUM_CUT_STEP) or takes substeps; what is not meant \
-                 to go so far ends with PILUM_E_DOMAIN. No check looks farther. At {}",
-                specimen.at(&step.start)
-            );
-            return Err(specimen.warns_at(&step.start, why));
+    let n = subject.each_by_default("blow up", 4, |specimen, random| {
+        let walk = specimen.paths(N_FAR, random)?;
+        match &walk.blown_up {
+            Some(step) => Err(blows_up(specimen, step)),
+            None => Ok(walk.steps.len()),
         }
-    }
-    if n == 0 {
-        return Err(skipped("no increment succeeded"));
-    }
-    Ok(format!("{n} increments"))
+    })?;
+    counted(n, "increments", "no increment succeeded")
+}
+
+/// The warning of a step whose results are larger than any that mean something.
+fn blows_up(specimen: &Specimen, step: &Step) -> Verdict {
+    let names = specimen.hypothesis.components().iter().copied();
+    let variables = specimen.formulation.internal_variables.iter();
+    let names = names.chain(variables.map(|v| v.id.as_str()));
+    let values = step.end.flux.iter().chain(&step.end.state);
+    let before = step.start.flux0.iter().chain(&step.start.state0);
+    let all = names.zip(before.zip(values));
+    let worst = all.max_by(|(_, (_, a)), (_, (_, b))| a.abs().total_cmp(&b.abs()));
+    let (name, (before, after)) = worst.unwrap_or(("n", (&0.0, &0.0)));
+    let why = format!(
+        "it has blown up: `{name}` goes from {before:e} to {after:e} in an increment. A scheme that is not \
+         stable over it asks for a smaller one (PILUM_CUT_STEP) or takes substeps; what is not meant \
+         to go so far ends with PILUM_E_DOMAIN. No check looks farther. At {}",
+        specimen.at(&step.start)
+    );
+    specimen.warns_for(&step.start, why)
 }
 
 /// Increments of the random part of a path, and the most of any check.
@@ -65,38 +65,34 @@ const N_FAR: usize = 36;
 const INELASTIC: f64 = 1e-6;
 
 fn paths_leave_elasticity(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "extent");
-    let (mut n, mut n_inelastic) = (0, 0);
+    let mut n_inelastic = 0;
     let mut still: Option<Vec<String>> = None;
     let mut idle = None;
-    for specimen in subject.specimens_by_default(1, &mut random)? {
-        let walk = specimen.paths(N_INCREMENTS, &mut random)?;
-        let (n_refused, why) = (walk.refusals.len(), walk.why());
-        let steps = walk.steps;
+    let n = subject.each_by_default("extent", 1, |specimen, random| {
+        let walk = specimen.paths(N_INCREMENTS, random)?;
+        let steps = &walk.steps;
         if steps.is_empty() {
-            continue;
+            return Ok(0);
         }
-        let starts: Vec<PointStart> = steps.iter().map(|step| step.start.clone()).collect();
-        if let Some(why) = silent_component(&specimen, &steps) {
-            let verdict = Verdict::Warning(format!("{}: {why}", specimen.name()));
-            return Err(specimen.recorded(&steps[0].start, verdict));
+        if let Some(why) = silent_component(specimen, steps) {
+            return Err(specimen.warns_for(&steps[0].start, why));
         }
-        let elastic = specimen.call(&starts, ELASTIC)?.points;
+        let elastic = specimen.call(&starts(steps), ELASTIC)?.points;
         let pairs = steps.iter().zip(&elastic);
         let inelastic = pairs.filter(|(step, elastic)| is_inelastic(step, elastic));
         let n_own = inelastic.count();
-        n += steps.len();
         n_inelastic += n_own;
         let has_own = !specimen.formulation.internal_variables.is_empty();
         let is_idle = n_own == 0 && !steps.iter().any(changes_later);
-        if is_idle && has_own && !specimen.formulation.linear {
-            idle = idle.or_else(|| Some((specimen.name(), n_refused, why)));
+        if is_idle && has_own && !specimen.formulation.linear && idle.is_none() {
+            idle = Some((specimen.name(), walk.refusals.len(), walk.why()));
         }
         // Under none of the hypotheses, and with no parameters.
-        let mut own = still_variables(&specimen, &steps);
+        let mut own = still_variables(specimen, steps);
         own.retain(|id| still.as_ref().is_none_or(|still| still.contains(id)));
         still = Some(own);
-    }
+        Ok(steps.len())
+    })?;
     if n == 0 {
         return Err(skipped("no increment succeeded"));
     }
@@ -106,7 +102,7 @@ fn paths_leave_elasticity(subject: &Subject) -> Found {
         } else {
             String::new()
         };
-        return Err(Verdict::Warning(format!(
+        return Err(warned(format!(
             "{name}: none of the increments leaves elasticity, and no internal variable changes after the first: no \
              check has seen what comes after yielding; other parameters by `--set`, or a path of your own by `--driver`{refused}"
         )));
@@ -121,12 +117,8 @@ fn paths_leave_elasticity(subject: &Subject) -> Found {
 
 /// Whether an increment that is not the first one of a point changes an internal variable.
 fn changes_later(step: &Step) -> bool {
-    let pairs = step.start.state0.iter().zip(&step.end.state);
     let is_later = step.start.gradient0.iter().any(|value| *value != 0.0);
-    is_later
-        && pairs
-            .into_iter()
-            .any(|(from, to)| from.to_bits() != to.to_bits())
+    is_later && bits(&step.start.state0) != bits(&step.end.state)
 }
 
 /// Whether the flux is not what the elastic operator makes of the increment.

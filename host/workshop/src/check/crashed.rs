@@ -2,7 +2,7 @@
 
 use super::Subject;
 use crate::Error;
-use crate::replay::{library, probed};
+use crate::replay::Called;
 use law::capsule::{Capsule, LibraryCapsule, status};
 use law::child::{self, Work};
 use law::probe::call_log::{Kept, KeptCall, KeptPhase};
@@ -35,16 +35,13 @@ pub(super) fn tell(subject: &Subject, kept: &Path) -> Result<(), Error> {
 }
 
 fn of_call(subject: &Subject, call: &KeptCall) -> Option<Capsule> {
-    let laws = subject.laws().ok()?;
-    let law = laws.iter().find(|law| law.description().id == call.law)?;
-    let mut hypotheses = super::specimen::hypotheses(law).into_iter();
-    let (formulation, hypothesis) = hypotheses.find(|(_, h)| h.name() == call.hypothesis)?;
+    let (law, formulation, hypothesis) = subject.law_of(call).ok()??;
     Capsule::of_probe(
-        law,
+        &law,
         &formulation,
-        (hypothesis, &call.parameters()),
+        (hypothesis, &call.parameters),
         (call.function, call.form),
-        &call.points(),
+        &call.points,
         &[],
     )
 }
@@ -66,7 +63,7 @@ pub(super) fn repeated(
     tell: Vec<OsString>,
     kept: &Path,
     limit: Duration,
-    origin: [(&str, toml::Value); 2],
+    origin: [(String, toml::Value); 2],
 ) -> Option<String> {
     let work = Work {
         arguments: tell,
@@ -78,10 +75,9 @@ pub(super) fn repeated(
     child::run(&work).ok()?;
     let scratch = &kept.with_extension("toml");
     let source = Source::read(scratch).ok()?;
-    let origin = origin.map(|(key, value)| (key.to_owned(), value));
     let internal = status(abi::status::Outcome::Internal).to_owned();
     if let Some(mut capsule) = LibraryCapsule::of_source(&source).ok()? {
-        capsule.outcome.message = library::run(scratch, limit).ok()?.1?;
+        capsule.outcome.message = Called::Library.elsewhere(scratch, limit).ok()?.crash?;
         capsule.outcome.status = internal;
         capsule.origin.extend(origin);
         return Some(capsule.to_string());
@@ -99,7 +95,7 @@ fn smallest(source: Source, scratch: &Path, limit: Duration) -> Option<(Capsule,
     let whole = Capsule::of_source(source).ok()?;
     let crash = |capsule: &Capsule| {
         capsule.write(scratch).ok()?;
-        probed::run(scratch, limit).ok()?.1
+        Called::Law.elsewhere(scratch, limit).ok()?.crash
     };
     let of_whole = crash(&whole)?;
     let mut singles = (0..whole.n_points().min(ONE_BY_ONE)).map(|i| whole.of_one(i));

@@ -1,7 +1,7 @@
 //! Is what the library says about its laws readable, complete and true?
 
-use super::{Check, Family, Found, Subject, Verdict, skipped};
-use law::adapter::Adapter;
+use super::{Check, Family, Found, Subject, Verdict, skipped, warned};
+use law::foreign::Adapter;
 use std::collections::BTreeSet;
 
 pub(super) const CHECKS: &[Check] = &[
@@ -89,28 +89,21 @@ fn description_is_complete(subject: &Subject) -> Found {
                 gaps.extend(empty(what, value));
             }
         }
+        let described = |of: String, [symbol, unit, doc]: [&str; 3]| {
+            let texts = [("symbol", symbol), ("unit", unit), ("doc", doc)];
+            let texts = texts.into_iter().skip(usize::from(is_sidecar));
+            let gaps = texts.filter_map(|(what, text)| empty(&format!("the {what} of {of}"), text));
+            gaps.collect::<Vec<_>>()
+        };
         for p in &d.parameters {
-            for (what, value) in [("symbol", &p.symbol), ("unit", &p.unit), ("doc", &p.doc)] {
-                if is_sidecar && what == "symbol" {
-                    continue;
-                }
-                gaps.extend(empty(&format!("the {what} of parameter `{}`", p.id), value));
-            }
+            let of = format!("parameter `{}`", p.id);
+            gaps.extend(described(of, [&p.symbol, &p.unit, &p.doc]));
         }
-        for formulation in &d.formulations {
-            for v in &formulation.internal_variables {
-                for (what, value) in [("symbol", &v.symbol), ("unit", &v.unit), ("doc", &v.doc)] {
-                    if is_sidecar && what == "symbol" {
-                        continue;
-                    }
-                    gaps.extend(empty(
-                        &format!("the {what} of internal variable `{}`", v.id),
-                        value,
-                    ));
-                }
-                if !v.initial_value.is_finite() {
-                    gaps.push(format!("the initial value of `{}` is not finite", v.id));
-                }
+        for v in d.formulations.iter().flat_map(|f| &f.internal_variables) {
+            let of = format!("internal variable `{}`", v.id);
+            gaps.extend(described(of, [&v.symbol, &v.unit, &v.doc]));
+            if !v.initial_value.is_finite() {
+                gaps.push(format!("the initial value of `{}` is not finite", v.id));
             }
         }
         if d.formulations.is_empty() {
@@ -273,7 +266,7 @@ fn all_well(gaps: &[String]) -> Found {
             .filter(|gap| rest.remove(gap))
             .map(String::as_str)
             .collect();
-        Err(Verdict::Warning(told.join("; ")))
+        Err(warned(told.join("; ")))
     }
 }
 

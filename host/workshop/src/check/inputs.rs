@@ -1,10 +1,10 @@
 //! Do parameters mean something, and numbers what their units say?
 
-use super::loading_path::Step;
-use super::mathematics::{ITERATED, NEEDS, UPDATE, flux_scale, increment, largest};
-use super::random::Random;
-use super::specimen::{Specimen, create_form, is_same, is_success};
-use super::{Check, Family, Found, Subject, Verdict, skipped};
+use super::loading_path::{Step, flux_scale, some};
+use super::mathematics::NEEDS;
+use super::points::{ELASTIC, ITERATED, UPDATE, apart, increment, is_same, is_success, largest};
+use super::specimen::Specimen;
+use super::{Check, Family, Found, Subject, Verdict, counted, warned};
 use abi::raw;
 use law::ParameterDescription;
 use law::probe::{Form, PointEnd, PointStart, Probe};
@@ -31,19 +31,6 @@ pub(super) const CHECKS: &[Check] = &[
         run: units_belong_together,
     },
 ];
-
-/// The law with other values, if it accepts them.
-fn with_values(specimen: &Specimen, values: &[f64]) -> Result<Option<Probe>, Verdict> {
-    let form = create_form(&specimen.formulation, specimen.hypothesis, values);
-    let created = specimen.law.probe(&form)?;
-    Ok(created.probe.filter(|_| created.status == raw::PILUM_OK))
-}
-
-/// At most this many starts, evenly.
-fn starts(steps: &[Step], most: usize) -> Vec<&Step> {
-    let every = steps.len().div_ceil(most).max(1);
-    steps.iter().step_by(every).collect()
-}
 
 /// Other values of a parameter: near it, then far, since a limit of iterations counts only if it is low.
 fn others(p: &ParameterDescription, value: f64) -> Vec<f64> {
@@ -74,96 +61,104 @@ fn with_each_choice(specimen: &Specimen) -> Vec<Vec<f64>> {
     all
 }
 
+/// Results that parameters of a law may change.
+struct Results<'a> {
+    specimen: &'a Specimen,
+    points: Vec<PointStart>,
+    fluxes: Vec<Vec<f64>>,
+}
+
+impl Results<'_> {
+    fn of(&self, probe: &Probe) -> Result<Vec<PointEnd>, Verdict> {
+        let mut ends = Vec::new();
+        for request in [UPDATE, ELASTIC] {
+            let form = self.specimen.form(request);
+            ends.extend(probe.integrate(&self.points, &form)?.points);
+        }
+        // Each by itself: a law may refuse one for all.
+        for flux in &self.fluxes {
+            let started = probe.init_state(std::slice::from_ref(flux), &Form::of(0))?;
+            ends.extend(started.into_iter().flat_map(|answer| answer.points));
+        }
+        Ok(ends)
+    }
+
+    /// Those with another value of one parameter, if the law accepts it.
+    fn with(&self, base: &[f64], i: usize, value: f64) -> Result<Option<Vec<PointEnd>>, Verdict> {
+        let mut values = base.to_vec();
+        values[i] = value;
+        let probe = self.specimen.with_values(&values)?;
+        probe.as_ref().map(|probe| self.of(probe)).transpose()
+    }
+}
+
+/// Whether a parameter was tried, and mattered.
+#[derive(Default)]
+struct Tried {
+    is_tried: bool,
+    matters: bool,
+}
+
 fn parameters_matter(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "parameters");
-    // Whether each parameter was tried, and mattered, by law.
-    let mut found: BTreeMap<(String, String), (bool, bool)> = BTreeMap::new();
-    for specimen in subject.specimens_by_default(4, &mut random)? {
-        let steps = specimen.paths(24, &mut random)?.steps;
-        let points: Vec<PointStart> = starts(&steps, 400)
-            .into_iter()
-            .map(|step| step.start.clone())
-            .collect();
-        let fluxes: Vec<Vec<f64>> = [1.0, 30.0, 1000.0]
-            .map(|pressure| specimen.under_pressure(pressure))
-            .to_vec();
-        let results = |probe: &Probe| -> Result<Vec<PointEnd>, Verdict> {
-            let mut ends = probe.integrate(&points, &specimen.form(UPDATE))?.points;
-            let elastic = raw::PILUM_REQ_FLUX | raw::PILUM_REQ_ELASTIC;
-            ends.extend(probe.integrate(&points, &specimen.form(elastic))?.points);
-            // Each by itself: a law may refuse one for all.
-            for flux in &fluxes {
-                let started = probe.init_state(std::slice::from_ref(flux), &Form::of(0))?;
-                ends.extend(started.into_iter().flat_map(|answer| answer.points));
-            }
-            Ok(ends)
+    let mut found: BTreeMap<(String, String), Tried> = BTreeMap::new();
+    subject.each_by_default("parameters", 4, |specimen, random| {
+        let steps = specimen.paths(24, random)?.steps;
+        let chosen = some(&steps, 400).into_iter();
+        let pressures = [1.0, 30.0, 1000.0];
+        let results = Results {
+            specimen,
+            points: chosen.map(|step| step.start.clone()).collect(),
+            fluxes: pressures.map(|p| specimen.under_pressure(p)).to_vec(),
         };
         let law = specimen.law.description();
         // Some count with one of the choices alone.
-        for base in with_each_choice(&specimen) {
-            let Some(probe) = with_values(&specimen, &base)? else {
+        for base in with_each_choice(specimen) {
+            let Some(probe) = specimen.with_values(&base)? else {
                 continue;
             };
             let mut expected = None;
             for (i, p) in law.parameters.iter().enumerate() {
                 let entry = found.entry((law.id.clone(), p.id.clone())).or_default();
-                if entry.1 || !p.choices.is_empty() || base[i].is_nan() {
+                if entry.matters || !p.choices.is_empty() || base[i].is_nan() {
                     continue;
                 }
                 let before = match &expected {
                     Some(before) => before,
-                    None => &*expected.insert(results(&probe)?),
+                    None => &*expected.insert(results.of(&probe)?),
                 };
                 for other in others(p, base[i]) {
-                    let mut values = base.clone();
-                    values[i] = other;
                     if other.to_bits() == base[i].to_bits() || !p.bounds.contain(other) {
                         continue;
                     }
-                    let Some(probe) = with_values(&specimen, &values)? else {
+                    let Some(ends) = results.with(&base, i, other)? else {
                         continue;
                     };
-                    let ends = results(&probe)?;
-                    entry.0 = true;
-                    entry.1 |= ends.iter().zip(before).any(|(a, b)| !is_same(a, b));
-                    if entry.1 {
+                    entry.is_tried = true;
+                    entry.matters |= ends.iter().zip(before).any(|(a, b)| !is_same(a, b));
+                    if entry.matters {
                         break;
                     }
                 }
-                let among = |value: f64| -> Result<Option<Vec<PointEnd>>, Verdict> {
-                    let mut values = base.clone();
-                    values[i] = value;
-                    with_values(&specimen, &values)?
-                        .as_ref()
-                        .map(results)
-                        .transpose()
-                };
-                if entry.1 && may_be_rounded(p) && is_rounded(p, base[i], among)? {
-                    return Err(Verdict::Warning(format!(
+                let among = |value| results.with(&base, i, value);
+                if entry.matters && may_be_rounded(p) && is_rounded(p, base[i], among)? {
+                    return Err(warned(format!(
                         "`{}` of `{}` is rounded to a whole number: values between two of them give the same bits",
                         p.id, law.id
                     )));
                 }
             }
         }
-    }
-    let tried = found.values().filter(|(tried, _)| *tried).count();
-    let idle = found
-        .iter()
-        .filter(|(_, (tried, matters))| *tried && !matters);
-    let idle: Vec<String> = idle
+        Ok(0)
+    })?;
+    let tried = || found.iter().filter(|(_, tried)| tried.is_tried);
+    let idle: Vec<String> = tried()
+        .filter(|(_, tried)| !tried.matters)
         .map(|((law, id), _)| format!("`{id}` of `{law}`"))
         .collect();
     if !idle.is_empty() {
-        return Err(Verdict::Warning(format!(
-            "no result depends on {}",
-            idle.join(", ")
-        )));
+        return Err(warned(format!("no result depends on {}", idle.join(", "))));
     }
-    if tried == 0 {
-        return Err(skipped("no parameter can be changed"));
-    }
-    Ok(format!("{tried} parameters"))
+    counted(tried().count(), "parameters", "no parameter can be changed")
 }
 
 /// Whether a parameter is no count, which may be a whole number.
@@ -275,38 +270,37 @@ impl Smaller {
 }
 
 fn units_belong_together(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "units");
-    let (mut n, mut unknown) = (0, 0);
+    let mut unknown = 0;
     let mut meant: Vec<String> = Vec::new();
-    for specimen in subject.specimens_by_default(3, &mut random)? {
-        let steps = specimen.paths(24, &mut random)?.steps;
+    let n = subject.each_by_default("units", 3, |specimen, random| {
+        let steps = specimen.paths(24, random)?.steps;
+        let mut n = 0;
         for smaller in SMALLER {
-            match in_smaller_units(&specimen, &steps, smaller) {
+            match in_smaller_units(specimen, &steps, smaller) {
                 Ok(Some(compared)) => n += compared,
                 Ok(None) => unknown += 1,
                 Err(verdict) => {
-                    let stated = stated(&specimen, smaller).ok_or(verdict)?;
+                    let stated = stated(specimen, smaller).ok_or(verdict)?;
                     if !meant.contains(&stated) {
                         meant.push(stated);
                     }
                 }
             }
         }
-    }
+        Ok(n)
+    })?;
     if !meant.is_empty() {
         return Ok(format!(
             "{n} increments; another result in other units, as is said of {}",
             meant.join("; ")
         ));
     }
-    if n == 0 {
-        return Err(skipped(if unknown > 0 {
-            "there are units that are not known, or none of force, length and time"
-        } else {
-            "no parameters in smaller units are accepted"
-        }));
-    }
-    Ok(format!("{n} increments"))
+    let none = if unknown > 0 {
+        "there are units that are not known, or none of force, length and time"
+    } else {
+        "no parameters in smaller units are accepted"
+    };
+    counted(n, "increments", none)
 }
 
 /// The sentence of the description that names a number one with a unit that becomes smaller, as "at 1 kPa":
@@ -363,7 +357,7 @@ fn in_smaller_units(
         return Ok(None);
     }
     let scaled = times(&specimen.values, &factors);
-    let Some(probe) = with_values(specimen, &scaled)? else {
+    let Some(probe) = specimen.with_values(&scaled)? else {
         return Ok(Some(0));
     };
     let n = specimen.probe.n_components();
@@ -376,7 +370,7 @@ fn in_smaller_units(
         of_gradient: vec![if is_interface { smaller.length } else { 1.0 }; n],
         of_flux: vec![smaller.force / (smaller.length * smaller.length); n],
     };
-    let chosen = starts(steps, 300);
+    let chosen = some(steps, 300);
     scaled.begins_alike(&chosen)?;
     scaled.goes_on_alike(&chosen).map(Some)
 }
@@ -406,14 +400,11 @@ impl Scaled<'_> {
 
     fn words(&self, what: &str) -> String {
         format!(
-            "{}: with all numbers in half the unit of {}, {what}: is there a number in the law whose unit \
+            "with all numbers in half the unit of {}, {what}: is there a number in the law whose unit \
              no parameter has? A tolerance {} is a mistake: let it be a part of what is compared. A reference as in \
              ln(p/1 kPa) is best a parameter with a unit and a default; or a sentence of the description names it \
              (`{}`).",
-            self.specimen.name(),
-            self.smaller.what,
-            self.smaller.example,
-            self.smaller.statement
+            self.smaller.what, self.smaller.example, self.smaller.statement
         )
     }
 
@@ -448,7 +439,7 @@ impl Scaled<'_> {
                     expected[k]
                 );
                 let why = format!("{} Compared with flux {flux:?}", self.words(&what));
-                return Err(Verdict::Warning(why));
+                return Err(self.specimen.warns(why));
             }
         }
         Ok(())
@@ -479,8 +470,7 @@ impl Scaled<'_> {
                     self.words(&what),
                     self.specimen.at(&step.start)
                 );
-                let verdict = Verdict::Warning(why);
-                return Err(self.specimen.recorded(&step.start, verdict));
+                return Err(self.specimen.warns_for(&step.start, why));
             }
         }
         Ok(compared)
@@ -489,8 +479,7 @@ impl Scaled<'_> {
     fn difference(&self, step: &Step, start: &PointStart, end: &PointEnd) -> Option<String> {
         let expected = times(&step.end.flux, &self.of_flux);
         let bound = ITERATED * flux_scale(step) * self.of_flux[0];
-        let mut pairs = end.flux.iter().zip(&expected);
-        if pairs.any(|(a, b)| (a - b).abs() > bound) {
+        if apart(&end.flux, &expected) > bound {
             return Some(format!("the flux is {:?}, expected {expected:?}", end.flux));
         }
         let expected = times(&step.end.state, &self.of_states);

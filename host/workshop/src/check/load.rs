@@ -1,6 +1,6 @@
 //! Can the file be opened, and is it of this contract?
 
-use super::{Check, Family, Found, Subject, Verdict, failed, skipped};
+use super::{Check, Family, Found, Subject, failed, skipped, warned};
 use law::probe;
 use object::{Architecture, BinaryFormat, Object, ObjectKind, ObjectSection};
 
@@ -154,15 +154,10 @@ fn exports_are_hidden(subject: &Subject) -> Found {
     if others.is_empty() {
         Ok(String::new())
     } else {
-        Err(Verdict::Warning(format!(
+        Err(warned(format!(
             "it exports {} symbols more: {}",
             others.len(),
-            others
-                .iter()
-                .take(5)
-                .cloned()
-                .collect::<Vec<_>>()
-                .join(", ")
+            others[..others.len().min(5)].join(", ")
         )))
     }
 }

@@ -1,8 +1,9 @@
 //! Points on their way: along random straight pieces, there and back as in a laboratory, or as the
 //! author's own driver leads them.
 
+use super::points::{ELASTIC, UPDATE, at_rest, increment, is_finite, is_success, largest, sum};
 use super::random::Random;
-use super::specimen::{Specimen, is_finite, is_success};
+use super::specimen::Specimen;
 use super::{Verdict, refusal, skipped};
 use abi::raw;
 use law::probe::{NO_OUTCOME, PointEnd, PointStart};
@@ -27,7 +28,24 @@ const LARGEST: f64 = 1e30;
 /// How near held fluxes are kept, relative to the largest; they need not be met.
 const HELD: f64 = 1e-3;
 
-const UPDATE: u32 = raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT;
+/// Starts of steps.
+pub(super) fn starts(steps: &[Step]) -> Vec<PointStart> {
+    steps.iter().map(|step| step.start.clone()).collect()
+}
+
+/// At most this many steps, evenly.
+pub(super) fn some(steps: &[Step], most: usize) -> Vec<&Step> {
+    let every = steps.len().div_ceil(most).max(1);
+    steps.iter().step_by(every).collect()
+}
+
+/// Fluxes in play in a step.
+pub(super) fn flux_scale(step: &Step) -> f64 {
+    let moved = step.stiffness * largest(&increment(&step.start));
+    largest(&step.end.flux)
+        .max(largest(&step.start.flux0))
+        .max(moved)
+}
 
 /// One increment of a point that ended well.
 #[derive(Clone, Debug)]
@@ -138,27 +156,15 @@ impl Specimen {
     }
 
     /// A point with this flux before anything has happened; in words why the law cannot start there.
-    pub(super) fn started(&self, flux: Vec<f64>) -> Result<Result<Origin, String>, Verdict> {
-        let n = flux.len();
-        let state0 = match self.initial_state(&flux)? {
+    pub(super) fn started(&self, flux: &[f64]) -> Result<Result<Origin, String>, Verdict> {
+        let state0 = match self.initial_state(flux)? {
             Ok(state0) => state0,
             Err(refused) => return Ok(Err(refused)),
         };
-        let pressure = flux.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
-        let start = PointStart {
-            gradient0: vec![0.0; n],
-            gradient1: vec![0.0; n],
-            flux0: flux,
-            state0,
-        };
-        let answer = self.call(
-            std::slice::from_ref(&start),
-            raw::PILUM_REQ_FLUX | raw::PILUM_REQ_ELASTIC,
-        )?;
-        let stiffness = answer.points[0]
-            .tangent
-            .iter()
-            .fold(0.0, |most: f64, k| most.max(k.abs()));
+        let pressure = largest(flux);
+        let start = at_rest(&vec![0.0; flux.len()], flux, &state0);
+        let answer = self.call(std::slice::from_ref(&start), ELASTIC)?;
+        let stiffness = largest(&answer.points[0].tangent);
         let status = answer.points[0].status;
         Ok(
             if is_success(status) && stiffness > 0.0 && stiffness.is_finite() {
@@ -199,14 +205,14 @@ impl Specimen {
             } else {
                 self.under_pressure(random.logarithmic(1.0, 1000.0))
             };
-            match self.started(flux)? {
+            match self.started(&flux)? {
                 Ok(origin) => return Ok(origin),
                 // The first reason, since a law that has panicked says no more why.
                 Err(refused) => why = why.or(Some(refused)),
             }
         }
         // A law of other signs starts where this one is pulled.
-        let hint = match self.started(self.under_pressure(-100.0))? {
+        let hint = match self.started(&self.under_pressure(-100.0))? {
             Ok(_) => "; a tension of 100 kPa is: compression is negative here",
             Err(_) => "",
         };
@@ -219,16 +225,11 @@ impl Specimen {
 
     /// A direction of random components, those that may move, of this length.
     pub(super) fn direction(&self, length: f64, random: &mut Random) -> Vec<f64> {
-        let components = 0..self.probe.n_components();
-        components
-            .map(|c| {
-                if self.is_free(c) {
-                    length * random.between(-1.0, 1.0)
-                } else {
-                    0.0
-                }
-            })
-            .collect()
+        let mut direction = vec![0.0; self.probe.n_components()];
+        for c in self.free() {
+            direction[c] = length * random.between(-1.0, 1.0);
+        }
+        direction
     }
 
     /// The author's path, if there is one; else points along random straight pieces. With tangents.
@@ -278,13 +279,11 @@ impl Specimen {
     /// The steps of a path that is given.
     fn along(&self, course: &[PointStart]) -> Result<Walk, Verdict> {
         let mut walk = Walk::default();
-        let elastic = self.call(course, raw::PILUM_REQ_FLUX | raw::PILUM_REQ_ELASTIC)?;
+        let elastic = self.call(course, ELASTIC)?;
         let answer = self.call(course, UPDATE)?;
         let text = answer.text().unwrap_or_default();
         for ((start, end), elastic) in course.iter().zip(answer.points).zip(elastic.points) {
-            let entries = elastic.tangent.iter();
-            let stiffness = entries.fold(0.0, |most: f64, k| most.max(k.abs()));
-            walk.take(&mut start.clone(), stiffness, end, &text);
+            walk.take(&mut start.clone(), largest(&elastic.tangent), end, &text);
         }
         Ok(walk)
     }
@@ -331,9 +330,7 @@ impl Specimen {
             size,
         } = self.origin(random)?;
         let n_normal = self.n_normal();
-        let free: Vec<usize> = (0..start.flux0.len())
-            .filter(|&c| self.is_free(c))
-            .collect();
+        let free: Vec<usize> = self.free().collect();
         let is_interface = n_normal == 1;
         let driven = if is_interface {
             usize::from(!random.once_in(4))
@@ -422,16 +419,13 @@ impl Specimen {
     /// Puts increments in the place of every fourth in which one component does not move at all, as it does
     /// in random ones: what a law keeps of the call before counts there.
     fn still_in_one(&self, starts: &mut [PointStart], random: &mut Random) -> Result<(), Verdict> {
-        let free: Vec<usize> = (0..self.probe.n_components())
-            .filter(|&c| self.is_free(c))
-            .collect();
+        let free: Vec<usize> = self.free().collect();
         let every_fourth: Vec<usize> = (0..starts.len()).skip(3).step_by(4).collect();
         let changed: Vec<PointStart> = every_fourth
             .iter()
             .map(|&i| {
                 let mut start = starts[i].clone();
-                let moved = start.gradient1.iter().zip(&start.gradient0);
-                let size = moved.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+                let size = largest(&increment(&start));
                 let still = free[random.below(free.len())];
                 for &c in &free {
                     let by = if c == still {
@@ -504,12 +498,7 @@ impl Walk {
             });
         }
         if is_sound {
-            let next = PointStart {
-                gradient0: point.gradient1.clone(),
-                gradient1: point.gradient1.clone(),
-                flux0: end.flux.clone(),
-                state0: end.state.clone(),
-            };
+            let next = at_rest(&point.gradient1, &end.flux, &end.state);
             let start = std::mem::replace(point, next);
             self.steps.push(Step {
                 start,
@@ -592,9 +581,4 @@ impl Led {
         }
         false
     }
-}
-
-/// The sum of two vectors.
-pub(super) fn sum(a: &[f64], b: &[f64]) -> Vec<f64> {
-    a.iter().zip(b).map(|(a, b)| a + b).collect()
 }

@@ -2,19 +2,16 @@
 
 mod axes;
 mod rates;
+mod rest;
 mod signs;
+mod slope;
 mod tangent;
-mod zero_strain;
 
-pub(super) use axes::own_random;
-pub(super) use tangent::{Slope, slope};
-pub(super) use zero_strain::counts;
+pub(super) use axes::{routine_agrees_in_the_plane, tangential_directions_are_alike};
+pub(super) use rest::{counts, routine_stays_at_rest};
+pub(super) use tangent::ddsdde_matches_differences;
 
-use super::loading_path::Step;
-use super::specimen::Specimen;
-use super::{Check, Family, Verdict};
-use abi::raw;
-use law::probe::PointStart;
+use super::{Check, Family};
 
 pub(super) const NEEDS: &[&str] = &[
     "repeatable",
@@ -67,7 +64,7 @@ pub(super) const CHECKS: &[Check] = &[
         description: "After an update, a zero increment keeps flux and internal variables, also \
                       300 times. Exempt: laws that depend on time, counters and rates.",
         needs: NEEDS,
-        run: zero_strain::zero_increment_changes_nothing,
+        run: rest::zero_increment_changes_nothing,
     },
     Check {
         id: "initial-states-fit",
@@ -75,7 +72,7 @@ pub(super) const CHECKS: &[Check] = &[
         description: "A zero increment keeps initial flux and the internal variables that \
                       `init_state` fits to it (warning, since a law may not carry that flux).",
         needs: NEEDS,
-        run: zero_strain::initial_states_fit,
+        run: rest::initial_states_fit,
     },
     Check {
         id: "hypotheses-agree",
@@ -129,37 +126,5 @@ pub(super) const CHECKS: &[Check] = &[
     },
 ];
 
-pub(super) const UPDATE: u32 = raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT;
-pub(super) const ELASTIC: u32 = raw::PILUM_REQ_FLUX | raw::PILUM_REQ_ELASTIC;
-/// Differences of fluxes between two ways to compute them, relative to the fluxes in play.
-/// Return mappings iterate to about 10⁻¹⁰.
-pub(super) const ITERATED: f64 = 1e-8;
-/// Asymmetry, relative to the largest entry.
-pub(super) const ROUND_OFF: f64 = 1e-9;
 /// Lengths of difference steps, relative to the increment.
 const LENGTHS: [f64; 3] = [1e-3, 1e-5, 1e-7];
-
-pub(super) fn largest(values: &[f64]) -> f64 {
-    values.iter().fold(0.0, |most, value| value.abs().max(most))
-}
-
-pub(super) fn increment(start: &PointStart) -> Vec<f64> {
-    let pairs = start.gradient1.iter().zip(&start.gradient0);
-    pairs.map(|(end, begin)| end - begin).collect()
-}
-
-/// Fluxes in play in a step.
-pub(super) fn flux_scale(step: &Step) -> f64 {
-    let moved = step.stiffness * largest(&increment(&step.start));
-    largest(&step.end.flux)
-        .max(largest(&step.start.flux0))
-        .max(moved)
-}
-
-/// Whether the flux depends on how long an increment takes.
-pub(super) fn depends_on_time(specimen: &Specimen, steps: &[Step]) -> Result<bool, Verdict> {
-    let starts: Vec<PointStart> = steps.iter().map(|step| step.start.clone()).collect();
-    let slower = specimen.lasting(10.0, &starts, raw::PILUM_REQ_FLUX)?;
-    let mut pairs = steps.iter().zip(&slower);
-    Ok(pairs.any(|(step, slower)| step.end.flux != slower.flux))
-}

@@ -1,7 +1,7 @@
 //! Does a law keep to the memory it is given?
 
-use super::random::Random;
-use super::specimen::{create_form, is_finite, is_success};
+use super::points::{ELASTIC, UPDATE, fluxes, is_finite, is_success};
+use super::specimen::create_form;
 use super::{Check, Family, Found, Subject, Verdict, skipped};
 use abi::raw;
 use law::probe::{Fence, Form, Order, process};
@@ -49,58 +49,42 @@ pub(super) const CHECKS: &[Check] = &[
     },
 ];
 
-const UPDATE: u32 = raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT;
 /// What a host may ask for.
-const REQUESTS: [u32; 3] = [
-    raw::PILUM_REQ_FLUX,
-    UPDATE,
-    raw::PILUM_REQ_FLUX | raw::PILUM_REQ_ELASTIC,
-];
+const REQUESTS: [u32; 3] = [raw::PILUM_REQ_FLUX, UPDATE, ELASTIC];
 
 /// Calls of both functions in a form, on points of paths. The number of points.
-fn in_form(
-    subject: &Subject,
-    name: &str,
-    change: impl Fn(&mut Form),
-) -> Result<usize, super::Verdict> {
-    let mut random = Random::new(subject.seed, name);
-    let mut n_points = 0;
-    for specimen in subject.specimens(2, &mut random)? {
+fn in_form(subject: &Subject, name: &str, change: impl Fn(&mut Form)) -> Result<usize, Verdict> {
+    subject.each(name, 2, |specimen, random| {
         // An odd number, so that arrays of outcomes do not fill whole words.
-        let points = specimen.points(33, &mut random)?;
+        let points = specimen.points(33, random)?;
+        let mut n_points = 0;
         for order in [Order::Points, Order::Components, Order::Spread] {
-            for request in REQUESTS {
+            let form = |request| {
                 let mut form = Form {
                     order,
                     ..Form::of(request)
                 };
                 change(&mut form);
-                let answer = specimen.probe.integrate(&points, &form)?;
-                if answer.stray {
-                    return Err(specimen.fails(format!(
+                form
+            };
+            for request in REQUESTS {
+                if specimen.probe.integrate(&points, &form(request))?.stray {
+                    return Err(specimen.fails(format_args!(
                         "something is written between the cells of an output, {}",
                         order.words()
                     )));
                 }
                 n_points += points.len();
             }
-            let fluxes: Vec<Vec<f64>> = points.iter().map(|p| p.flux0.clone()).collect();
-            let mut form = Form {
-                order,
-                ..Form::of(0)
-            };
-            change(&mut form);
-            if specimen
-                .probe
-                .init_state(&fluxes, &form)?
-                .is_some_and(|answer| answer.stray)
-            {
+            let (fluxes, form) = (fluxes(&points), form(0));
+            let answer = specimen.probe.init_state(&fluxes, &form)?;
+            if answer.is_some_and(|answer| answer.stray) {
                 let why = "`init_state` writes between the cells of `state1`";
                 return Err(specimen.fails_to_start(&fluxes, &form, &[], why));
             }
         }
-    }
-    Ok(n_points)
+        Ok(n_points)
+    })
 }
 
 fn writes_stay_inside(subject: &Subject) -> Found {
@@ -127,36 +111,32 @@ fn inputs_stay_untouched(subject: &Subject) -> Found {
 }
 
 fn results_are_finite(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "finite");
-    let mut n_successes = 0;
-    for specimen in subject.specimens(3, &mut random)? {
-        let walk = specimen.paths(20, &mut random)?;
-        if walk.steps.len() < walk.successes.len() {
-            return Err(specimen.fails(format!(
+    let n = subject.each("finite", 3, |specimen, random| {
+        let walk = specimen.paths(20, random)?;
+        let (starts, n) = (walk.successes, walk.steps.len());
+        if n < starts.len() {
+            return Err(specimen.fails(format_args!(
                 "{} of {} points that are said to have succeeded have results that are not \
                  finite, or not written",
-                walk.successes.len() - walk.steps.len(),
-                walk.successes.len()
+                starts.len() - n,
+                starts.len()
             )));
         }
-        n_successes += walk.successes.len();
-        let starts = walk.successes;
         for request in REQUESTS {
-            let answer = specimen.call(&starts, request)?;
-            let bad = answer
-                .points
-                .iter()
-                .position(|end| is_success(end.status) && !is_finite(end));
-            if let Some(i) = bad {
+            let ends = specimen.call(&starts, request)?.points;
+            let mut pairs = starts.iter().zip(&ends);
+            let bad = pairs.find(|(_, end)| is_success(end.status) && !is_finite(end));
+            if let Some((start, _)) = bad {
                 let why = format!(
                     "with request {request}, the results at {} are not finite, or not written",
-                    specimen.at(&starts[i])
+                    specimen.at(start)
                 );
-                return Err(specimen.fails_at(&starts[i], why));
+                return Err(specimen.fails_for(start, why));
             }
         }
-    }
-    Ok(format!("{n_successes} points"))
+        Ok(starts.len())
+    })?;
+    Ok(format!("{n} points"))
 }
 
 /// Calls between two looks at the heap, and looks.
@@ -164,87 +144,76 @@ const CALLS: usize = 400;
 const LOOKS: usize = 3;
 
 /// Something that is to leave nothing behind.
-type Work<'a> = Box<dyn Fn() -> Result<(), Verdict> + 'a>;
+type Work<'a> = &'a dyn Fn() -> Result<(), Verdict>;
 
 fn memory_is_freed(subject: &Subject) -> Found {
     if process::heap_in_use().is_none() {
         return Err(skipped("the system does not tell what is in use"));
     }
-    let mut random = Random::new(subject.seed, "heap");
-    for specimen in subject.specimens(1, &mut random)? {
-        let point = specimen.points(1, &mut random)?;
+    subject.each("heap", 1, |specimen, random| {
+        let point = specimen.points(1, random)?;
         let mut broken = point.clone();
         broken[0].gradient1[0] = f64::NAN;
-        let fluxes = vec![point[0].flux0.clone()];
+        let fluxes = fluxes(&point);
         let mut refused = specimen.values.clone();
         if let Some(first) = refused.first_mut() {
             *first = f64::INFINITY;
         }
+        let create = |values: &[f64]| -> Result<(), Verdict> {
+            let form = create_form(&specimen.formulation, specimen.hypothesis, values);
+            specimen.law.probe(&form)?;
+            Ok(())
+        };
+        let init = || -> Result<(), Verdict> {
+            specimen.probe.init_state(&fluxes, &Form::of(0))?;
+            Ok(())
+        };
         let kinds: [(&str, Work<'_>); 5] = [
-            (
-                "a call of `integrate`",
-                Box::new(|| specimen.call(&point, UPDATE).map(drop)),
-            ),
-            (
-                "a call of `integrate` that fails",
-                Box::new(|| specimen.call(&broken, UPDATE).map(drop)),
-            ),
-            (
-                "a call of `init_state`",
-                Box::new(|| {
-                    specimen.probe.init_state(&fluxes, &Form::of(0))?;
-                    Ok(())
-                }),
-            ),
-            (
-                "an instance",
-                Box::new(|| {
-                    let form =
-                        create_form(&specimen.formulation, specimen.hypothesis, &specimen.values);
-                    specimen.law.probe(&form)?;
-                    Ok(())
-                }),
-            ),
-            (
-                "`create` that refuses",
-                Box::new(|| {
-                    let form = create_form(&specimen.formulation, specimen.hypothesis, &refused);
-                    specimen.law.probe(&form)?;
-                    Ok(())
-                }),
-            ),
+            ("a call of `integrate`", &|| {
+                specimen.call(&point, UPDATE).map(drop)
+            }),
+            ("a call of `integrate` that fails", &|| {
+                specimen.call(&broken, UPDATE).map(drop)
+            }),
+            ("a call of `init_state`", &init),
+            ("an instance", &|| create(&specimen.values)),
+            ("`create` that refuses", &|| create(&refused)),
         ];
         for (what, work) in kinds {
-            let mut least = [usize::MAX; 2];
-            // The first calls may fill what later ones use again.
-            for look in 0..=LOOKS {
-                let in_use =
-                    || [process::heap_in_use(), process::mapped()].map(Option::unwrap_or_default);
-                let before = in_use();
-                for _ in 0..CALLS {
-                    work()?;
-                }
-                let after = in_use();
-                if look > 0 {
-                    for k in 0..2 {
-                        least[k] = least[k].min(after[k].saturating_sub(before[k]));
-                    }
-                }
-            }
-            let [heap, mapped] = least;
+            let [heap, mapped] = left_behind(work)?;
             if heap >= 8 * CALLS {
-                return Err(specimen.fails(format!(
+                return Err(specimen.fails(format_args!(
                     "{what} leaves {} bytes of the heap in use",
                     heap / CALLS
                 )));
             }
             // Less than a page in each of many calls is the allocator's.
             if mapped >= 4096 * CALLS {
-                return Err(
-                    specimen.fails(format!("{what} leaves {} bytes mapped", mapped / CALLS))
-                );
+                let bytes = mapped / CALLS;
+                return Err(specimen.fails(format_args!("{what} leaves {bytes} bytes mapped")));
+            }
+        }
+        Ok(0)
+    })?;
+    Ok(format!("{} calls of each kind", (LOOKS + 1) * CALLS))
+}
+
+/// The least growth of the heap and of the mapped memory in a series of calls, in bytes.
+fn left_behind(work: Work<'_>) -> Result<[usize; 2], Verdict> {
+    let in_use = || [process::heap_in_use(), process::mapped()].map(Option::unwrap_or_default);
+    let mut least = [usize::MAX; 2];
+    // The first calls may fill what later ones use again.
+    for look in 0..=LOOKS {
+        let before = in_use();
+        for _ in 0..CALLS {
+            work()?;
+        }
+        let after = in_use();
+        if look > 0 {
+            for k in 0..2 {
+                least[k] = least[k].min(after[k].saturating_sub(before[k]));
             }
         }
     }
-    Ok(format!("{} calls of each kind", (LOOKS + 1) * CALLS))
+    Ok(least)
 }

@@ -3,12 +3,13 @@
 mod arguments;
 mod earlier_calls;
 mod environment;
-mod fresh_process;
 
+use super::points::{UPDATE, first_difference, increment, is_same};
 use super::random::Random;
-use super::specimen::{Function, Specimen, first_difference, is_same};
-use super::{Check, Family, Found, Subject, Verdict, skipped};
+use super::specimen::{BOTH, Specimen, name};
+use super::{Check, Family, Found, Subject, Verdict, fresh_process, skipped};
 use abi::raw;
+use law::probe::call_log::Function;
 use law::probe::{Form, Order, PointEnd, PointStart};
 use std::time::Instant;
 
@@ -23,7 +24,7 @@ pub(super) const CHECKS: &[Check] = &[
             "writes-stay-inside",
             "inputs-stay-untouched",
         ],
-        run: repeatable,
+        run: |subject| compare(subject, "repeatable", after_others),
     },
     Check {
         id: "independent-of-split",
@@ -31,14 +32,14 @@ pub(super) const CHECKS: &[Check] = &[
         description: "Points give the same bits in one batch, one by one, in batches of random \
                       sizes, and in one of 20 011 points.",
         needs: &["repeatable"],
-        run: independent_of_split,
+        run: |subject| compare(subject, "split", split),
     },
     Check {
         id: "independent-of-order",
         family: Family::Purity,
         description: "Points give the same bits in another order.",
         needs: &["independent-of-split"],
-        run: independent_of_order,
+        run: |subject| compare(subject, "order", shuffled),
     },
     Check {
         id: "independent-of-request",
@@ -72,7 +73,7 @@ pub(super) const CHECKS: &[Check] = &[
         description: "Eight threads that use one instance at the same time get the same bits as \
                       one.",
         needs: &["repeatable"],
-        run: independent_of_thread,
+        run: |subject| compare(subject, "thread", by_many_threads),
     },
     Check {
         id: "instances-are-independent",
@@ -121,20 +122,19 @@ pub(super) const CHECKS: &[Check] = &[
         family: Family::Purity,
         description: "Nothing is written to the standard output or the error stream.",
         needs: &["integrate-works"],
-        run: environment::drive,
+        run: |subject| environment::drive(subject).map(|()| String::new()),
     },
     Check {
         id: "writes-no-files",
         family: Family::Purity,
         description: "No file is left in the working directory.",
         needs: &["integrate-works"],
-        run: environment::drive,
+        run: |subject| environment::drive(subject).map(|()| String::new()),
     },
 ];
 
-const UPDATE: u32 = raw::PILUM_REQ_FLUX | raw::PILUM_REQ_TANGENT;
-
 /// One of the functions of a law.
+#[derive(Clone, Copy)]
 struct Called<'a> {
     specimen: &'a Specimen,
     function: Function,
@@ -142,12 +142,23 @@ struct Called<'a> {
 
 impl Called<'_> {
     fn update(&self, points: &[PointStart]) -> Result<Vec<PointEnd>, Verdict> {
-        self.requested(points, UPDATE)
+        self.ask(points, &self.specimen.form(UPDATE))
     }
 
-    fn requested(&self, points: &[PointStart], request: u32) -> Result<Vec<PointEnd>, Verdict> {
-        let form = self.specimen.form(request);
-        self.specimen.ask(self.function, points, &form)
+    fn fluxes(&self, points: &[PointStart]) -> Result<Vec<PointEnd>, Verdict> {
+        self.ask(points, &self.specimen.form(raw::PILUM_REQ_FLUX))
+    }
+
+    fn in_order(&self, points: &[PointStart], order: Order) -> Result<Vec<PointEnd>, Verdict> {
+        let form = Form {
+            order,
+            ..self.specimen.form(UPDATE)
+        };
+        self.ask(points, &form)
+    }
+
+    fn ask(&self, points: &[PointStart], form: &Form) -> Result<Vec<PointEnd>, Verdict> {
+        self.specimen.ask(self.function, points, form)
     }
 }
 
@@ -157,97 +168,99 @@ fn compare(
     name: &str,
     mut other: impl FnMut(&Called<'_>, &[PointStart], &mut Random) -> Result<Vec<PointEnd>, Verdict>,
 ) -> Found {
-    let mut random = Random::new(subject.seed, name);
-    let mut n = 0;
-    for specimen in &subject.specimens(3, &mut random)? {
-        let points = specimen.points(96, &mut random)?;
-        for function in Function::BOTH {
+    let n = subject.each(name, 3, |specimen, random| {
+        let points = specimen.points(96, random)?;
+        for function in BOTH {
             let called = Called { specimen, function };
             let expected = called.update(&points)?;
-            let found = other(&called, &points, &mut random)?;
+            let found = other(&called, &points, random)?;
             if let Some(i) = first_difference(&expected, &found) {
-                return Err(differs(&called, &points, i, &expected[i], found.get(i)));
+                return Err(differs(called, &points, i, &expected[i], found.get(i)));
             }
         }
-        n += points.len();
-    }
+        Ok(points.len())
+    })?;
     Ok(format!("{n} points"))
 }
 
 /// Another result than before.
 fn differs(
-    called: &Called<'_>,
+    Called { specimen, function }: Called<'_>,
     points: &[PointStart],
     i: usize,
     expected: &PointEnd,
     found: Option<&PointEnd>,
 ) -> Verdict {
-    let specimen = called.specimen;
-    if called.function == Function::InitState {
-        let why = format!(
-            "`init_state`, point {i} of {}: flux {:?} gave internal variables {:?}, then {:?}",
-            points.len(),
+    let n = points.len();
+    let found = |values: fn(&PointEnd) -> &Vec<f64>| found.map(values).cloned().unwrap_or_default();
+    let why = if function == Function::InitState {
+        format!(
+            "`{}`, point {i} of {n}: flux {:?} gave internal variables {:?}, then {:?}",
+            name(function),
             points[i].flux0,
             expected.state,
-            found.map(|end| end.state.clone()).unwrap_or_default()
-        );
-        let fluxes: Vec<Vec<f64>> = points.iter().map(|point| point.flux0.clone()).collect();
-        return specimen.fails_to_start(&fluxes, &specimen.form(0), &[], why);
+            found(|end| &end.state)
+        )
+    } else {
+        format!(
+            "point {i} of {n}: {} gave flux {:?}, then {:?}",
+            specimen.at(&points[i]),
+            expected.flux,
+            found(|end| &end.flux)
+        )
+    };
+    specimen.fails_in(function, (points, i), (&specimen.form(0), &[]), why)
+}
+
+/// After calls for other points, and for other operators.
+fn after_others(
+    called: &Called<'_>,
+    points: &[PointStart],
+    _: &mut Random,
+) -> Result<Vec<PointEnd>, Verdict> {
+    let mut others = points.to_vec();
+    for point in &mut others {
+        let moved = increment(point);
+        for c in called.specimen.free() {
+            point.gradient1[c] = point.gradient0[c] - 3.0 * moved[c];
+        }
+        for value in &mut point.flux0 {
+            *value *= 0.5;
+        }
     }
-    let why = format!(
-        "point {i} of {}: {} gave flux {:?}, then {:?}",
-        points.len(),
-        specimen.at(&points[i]),
-        expected.flux,
-        found.map(|end| end.flux.clone()).unwrap_or_default()
-    );
-    specimen.fails_at(&points[i], why)
+    called.update(&others)?;
+    called.fluxes(points)?;
+    called.update(points)
 }
 
-fn repeatable(subject: &Subject) -> Found {
-    compare(subject, "repeatable", |called, points, _| {
-        let mut others = points.to_vec();
-        for point in &mut others {
-            for (c, value) in point.gradient1.iter_mut().enumerate() {
-                if called.specimen.is_free(c) {
-                    *value = point.gradient0[c] - 3.0 * (*value - point.gradient0[c]);
-                }
-            }
-            for value in &mut point.flux0 {
-                *value *= 0.5;
-            }
-        }
-        called.update(&others)?;
-        called.requested(points, raw::PILUM_REQ_FLUX)?;
-        called.update(points)
-    })
-}
-
-fn independent_of_split(subject: &Subject) -> Found {
-    compare(subject, "split", |called, points, random| {
-        let mut singles = Vec::new();
-        for point in points {
-            singles.extend(called.update(std::slice::from_ref(point))?);
-        }
-        let mut parts = Vec::new();
-        let mut rest = points;
-        while !rest.is_empty() {
-            let n = (1 + random.below(9)).min(rest.len());
-            parts.extend(called.update(&rest[..n])?);
-            rest = &rest[n..];
-        }
-        // Where they differ from each other, one of them differs from the whole.
-        let differing = first_difference(&singles, &parts).is_some();
-        let whole = called.update(points)?;
-        let singles_differ = first_difference(&singles, &whole).is_some();
-        if !differing && !singles_differ {
-            return in_one_of_many(called, points);
-        }
-        Ok(if differing && !singles_differ {
-            parts
-        } else {
-            singles
-        })
+/// One by one, and in batches of random sizes.
+fn split(
+    called: &Called<'_>,
+    points: &[PointStart],
+    random: &mut Random,
+) -> Result<Vec<PointEnd>, Verdict> {
+    let mut singles = Vec::new();
+    for point in points {
+        singles.extend(called.update(std::slice::from_ref(point))?);
+    }
+    let mut parts = Vec::new();
+    let mut rest = points;
+    while !rest.is_empty() {
+        let n = (1 + random.below(9)).min(rest.len());
+        parts.extend(called.update(&rest[..n])?);
+        rest = &rest[n..];
+    }
+    // Where they differ from each other, one of them differs from the whole.
+    let differing = first_difference(&singles, &parts).is_some();
+    let whole = called.update(points)?;
+    let singles_differ = first_difference(&singles, &whole).is_some();
+    if !differing && !singles_differ {
+        return in_one_of_many(called, points);
+    }
+    Ok(if differing && !singles_differ {
+        parts
+    } else {
+        singles
     })
 }
 
@@ -258,8 +271,8 @@ const MANY: usize = 20_011;
 /// does.
 fn in_one_of_many(called: &Called<'_>, points: &[PointStart]) -> Result<Vec<PointEnd>, Verdict> {
     let many: Vec<PointStart> = points.iter().cycle().take(MANY).cloned().collect();
-    let ends = called.requested(&many, raw::PILUM_REQ_FLUX)?;
-    let few = called.requested(points, raw::PILUM_REQ_FLUX)?;
+    let ends = called.fluxes(&many)?;
+    let few = called.fluxes(points)?;
     let mut expected = called.update(points)?;
     for (i, end) in ends.into_iter().enumerate() {
         let k = i % points.len();
@@ -271,38 +284,33 @@ fn in_one_of_many(called: &Called<'_>, points: &[PointStart]) -> Result<Vec<Poin
     Ok(expected)
 }
 
-fn independent_of_order(subject: &Subject) -> Found {
-    compare(subject, "order", |called, points, random| {
-        let mut order: Vec<usize> = (0..points.len()).collect();
-        for i in (1..order.len()).rev() {
-            order.swap(i, random.below(i + 1));
-        }
-        let shuffled: Vec<PointStart> = order.iter().map(|&i| points[i].clone()).collect();
-        let ends = called.update(&shuffled)?;
-        let mut back: Vec<(usize, PointEnd)> = order.into_iter().zip(ends).collect();
-        back.sort_by_key(|(i, _)| *i);
-        Ok(back.into_iter().map(|(_, end)| end).collect())
-    })
+/// In another order.
+fn shuffled(
+    called: &Called<'_>,
+    points: &[PointStart],
+    random: &mut Random,
+) -> Result<Vec<PointEnd>, Verdict> {
+    let mut order: Vec<usize> = (0..points.len()).collect();
+    for i in (1..order.len()).rev() {
+        order.swap(i, random.below(i + 1));
+    }
+    let shuffled: Vec<PointStart> = order.iter().map(|&i| points[i].clone()).collect();
+    let ends = called.update(&shuffled)?;
+    let mut back: Vec<(usize, PointEnd)> = order.into_iter().zip(ends).collect();
+    back.sort_by_key(|(i, _)| *i);
+    Ok(back.into_iter().map(|(_, end)| end).collect())
 }
 
 fn independent_of_layout(subject: &Subject) -> Found {
-    let in_order = |called: &Called<'_>, points: &[PointStart], order| -> Result<_, Verdict> {
-        let form = Form {
-            order,
-            ..called.specimen.form(UPDATE)
-        };
-        called.specimen.ask(called.function, points, &form)
-    };
     for order in [Order::Components, Order::Spread] {
         compare(subject, "layout", |called, points, _| {
-            in_order(called, points, order)
+            called.in_order(points, order)
         })?;
     }
     compare(subject, "layout", |called, points, _| {
         let mut ends = Vec::new();
         for point in points {
-            let same = vec![point.clone(); 3];
-            let three = in_order(called, &same, Order::Uniform)?;
+            let three = called.in_order(&vec![point.clone(); 3], Order::Uniform)?;
             let Some(first) = three.first() else { break };
             // The one of the three that differs, if any does.
             let odd = three.iter().find(|end| !is_same(first, end));
@@ -312,33 +320,34 @@ fn independent_of_layout(subject: &Subject) -> Found {
     })
 }
 
-fn independent_of_thread(subject: &Subject) -> Found {
-    compare(subject, "thread", |called, points, _| {
-        // Slow laws meet each other in fewer calls.
-        let start = Instant::now();
-        let alone = called.update(points)?;
-        let n_calls = (0.02 / start.elapsed().as_secs_f64()).clamp(3.0, 20.0) as usize;
-        let work = || -> Result<Vec<PointEnd>, Verdict> {
-            // Of all calls, since few of them may meet another thread's on a busy machine.
-            for _ in 0..n_calls {
-                let ends = called.update(points)?;
-                if first_difference(&alone, &ends).is_some() {
-                    return Ok(ends);
-                }
+/// By eight threads at the same time: of the first one that differs, if any does.
+fn by_many_threads(
+    called: &Called<'_>,
+    points: &[PointStart],
+    _: &mut Random,
+) -> Result<Vec<PointEnd>, Verdict> {
+    // Slow laws meet each other in fewer calls.
+    let start = Instant::now();
+    let alone = called.update(points)?;
+    let n_calls = (0.02 / start.elapsed().as_secs_f64()).clamp(3.0, 20.0) as usize;
+    let work = || -> Result<Option<Vec<PointEnd>>, Verdict> {
+        // Of all calls, since few of them may meet another thread's on a busy machine.
+        for _ in 0..n_calls {
+            let ends = called.update(points)?;
+            if first_difference(&alone, &ends).is_some() {
+                return Ok(Some(ends));
             }
-            Ok(alone.clone())
-        };
-        let all = std::thread::scope(|scope| {
-            let threads: Vec<_> = (0..8).map(|_| scope.spawn(work)).collect();
-            let results = threads.into_iter().map(|thread| {
-                thread
-                    .join()
-                    .map_err(|_| skipped("a thread of the check panicked"))?
-            });
-            results.collect::<Result<Vec<_>, Verdict>>()
-        })?;
-        let mut all = all.into_iter();
-        let odd = all.find(|ends| first_difference(&alone, ends).is_some());
-        Ok(odd.unwrap_or(alone))
-    })
+        }
+        Ok(None)
+    };
+    let odd = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..8).map(|_| scope.spawn(work)).collect();
+        let results = threads.into_iter().map(|thread| {
+            thread
+                .join()
+                .map_err(|_| skipped("a thread of the check panicked"))?
+        });
+        results.collect::<Result<Vec<_>, Verdict>>()
+    })?;
+    Ok(odd.into_iter().flatten().next().unwrap_or(alone))
 }

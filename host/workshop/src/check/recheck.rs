@@ -1,11 +1,13 @@
 //! A check once more, of the one increment of a capsule that it has left: does it still find the same?
 
+use super::in_child::{self, Answer};
+use super::schedule::applies;
 use super::specimen::{Specimen, create_form, hypotheses};
-use super::{
-    Answer, Arguments, Check, Outcome, ScratchFolder, Subject, Verdict, applies, asked_in_child,
-    checks, failed, own_arguments, routine, run_check,
-};
-use crate::Error;
+use super::verdict::Outcome;
+use super::{Arguments, Check, Subject, Verdict, checks, failed, routine};
+use crate::replay::parameters;
+use crate::scratch::Scratch;
+use crate::{Error, internal};
 use law::Opener;
 use law::capsule::Capsule;
 use std::path::Path;
@@ -28,28 +30,15 @@ pub(crate) fn ask(
         return Ok(());
     };
     let arguments = Arguments {
-        library: Some(library.display().to_string()),
-        json: false,
-        only: vec![check.id.to_owned()],
         seed: seed_of(capsule),
-        set: Vec::new(),
-        driver: None,
-        out: None,
-        only_failed: false,
-        strict: false,
         time_limit: PATIENCE,
-        list: false,
-        in_process: opener.trust().isolate.is_none(),
-        child: false,
-        near: false,
-        at: Some(std::path::absolute(file).map_err(|why| Error::internal(why.to_string()))?),
-        kept: None,
-        tell: None,
+        at: Some(std::path::absolute(file).map_err(internal)?),
+        ..Arguments::default()
     };
-    let answer = if arguments.in_process {
-        run_check(check, &Subject::new(&arguments, opener, library))
+    let answer = if opener.trust().isolate.is_none() {
+        in_child::answer(check, &Subject::new(&arguments, opener, library))
     } else {
-        asked_in_child(check, &arguments, library, &ScratchFolder::new()?, false)?
+        in_child::ask(check, &arguments, library, Scratch::new()?.path(), false)?
     };
     told(check, &answer, capsule, say);
     if answer.outcome.is_bad() {
@@ -61,13 +50,8 @@ pub(crate) fn ask(
             at: None,
             ..arguments
         };
-        let own = own_arguments(check, &whole);
-        let own: Vec<_> = own.iter().map(|a| a.to_string_lossy()).collect();
-        say(&format!(
-            "the whole check: pilum check {} {}",
-            library.display(),
-            own.join(" ")
-        ));
+        let command = whole.command_of(check, library);
+        say(&format!("the whole check: {command}"));
     }
     Ok(())
 }
@@ -115,11 +99,7 @@ impl Subject {
             .into_iter()
             .find(|(_, hypothesis)| capsule.hypothesis() == Some(*hypothesis))
             .ok_or_else(|| failed("the law does not offer the hypothesis"))?;
-        let parameters = law.description().parameters.iter();
-        let ids = parameters.map(|p| p.id.as_str());
-        let values = capsule
-            .in_order(&capsule.parameters, ids, &["parameters"], "parameter")
-            .map_err(unusable)?;
+        let values = parameters(capsule, &law).map_err(unusable)?;
         let [points, _] = capsule.batch(hypothesis, &formulation).map_err(unusable)?;
         let created = law.probe(&create_form(&formulation, hypothesis, &values))?;
         let probe = created

@@ -1,37 +1,12 @@
 //! Report of checks: a line each, and common findings once.
 
-use super::{Check, Error, Family, checks};
-use serde::{Deserialize, Serialize};
+use super::verdict::Outcome;
+use super::{Check, Family, checks};
+use crate::{Error, internal};
+use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::PathBuf;
-
-/// How a check ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub(super) enum Outcome {
-    Passed,
-    Warning,
-    Failed,
-    Crashed,
-    Skipped,
-}
-
-impl Outcome {
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::Passed => "passed",
-            Self::Warning => "warning",
-            Self::Failed => "failed",
-            Self::Crashed => "crashed",
-            Self::Skipped => "skipped",
-        }
-    }
-
-    pub(super) fn is_bad(self) -> bool {
-        matches!(self, Self::Failed | Self::Crashed)
-    }
-}
 
 /// A line of the report.
 #[derive(Clone, Debug, Serialize)]
@@ -70,19 +45,40 @@ pub(super) struct Report<'a> {
     pub(super) counts: BTreeMap<&'static str, usize>,
 }
 
-pub(super) fn finding(check: &Check, outcome: Outcome, details: String) -> Finding {
-    Finding {
-        id: check.id,
-        family: check.family,
-        description: check.description,
-        outcome,
-        details,
-        replay: None,
-        capsule: None,
-        nearest: BTreeMap::new(),
-        ended: None,
-        is_late: false,
-        is_well_nearby: false,
+impl Finding {
+    pub(super) fn new(check: &'static Check, outcome: Outcome, details: String) -> Self {
+        Self {
+            id: check.id,
+            family: check.family,
+            description: check.description,
+            outcome,
+            details,
+            replay: None,
+            capsule: None,
+            nearest: BTreeMap::new(),
+            ended: None,
+            is_late: false,
+            is_well_nearby: false,
+        }
+    }
+
+    /// Its lines.
+    fn text(&self) -> String {
+        let name = self.outcome.name();
+        let word = if self.outcome.is_bad() {
+            name.to_uppercase()
+        } else {
+            name.to_owned()
+        };
+        let line = format!("  {word:9}{:32}{}", self.id, self.details);
+        let mut text = format!("{}\n", line.trim_end());
+        if let Some(replay) = &self.replay {
+            let _ = writeln!(text, "           {}\n           {replay}", self.description);
+        }
+        if let Some(capsule) = &self.capsule {
+            let _ = writeln!(text, "           pilum replay {}", capsule.display());
+        }
+        text
     }
 }
 
@@ -115,75 +111,39 @@ pub(super) fn tell_once(findings: &mut [Finding]) {
 }
 
 pub(super) fn json(value: &impl Serialize) -> Result<String, Error> {
-    serde_json::to_string_pretty(value).map_err(|error| Error::internal(error.to_string()))
+    serde_json::to_string_pretty(value).map_err(internal)
 }
 
 pub(super) fn list(as_json: bool) -> Result<String, Error> {
-    #[derive(Serialize)]
-    struct Listed {
-        id: &'static str,
-        family: Family,
-        description: &'static str,
-        needs: &'static [&'static str],
-    }
     if as_json {
-        let all: Vec<Listed> = checks()
-            .map(|check| Listed {
-                id: check.id,
-                family: check.family,
-                description: check.description,
-                needs: check.needs,
-            })
-            .collect();
+        let all: Vec<&Check> = checks().collect();
         return Ok(format!("{}\n", json(&all)?));
     }
-    let mut text = String::new();
-    for check in checks() {
-        let _ = writeln!(text, "{}\n    {}", check.id, check.description);
-    }
-    Ok(text)
+    let line = |check: &Check| format!("{}\n    {}\n", check.id, check.description);
+    Ok(checks().map(line).collect())
 }
 
-pub(super) fn text(report: &Report<'_>) -> String {
-    let mut text = format!(
-        "{}\nsha256 {}, seed {}\n",
-        report.library, report.sha256, report.seed
-    );
-    let mut family = None;
-    for finding in report.checks {
-        if family != Some(finding.family) {
-            family = Some(finding.family);
-            let _ = writeln!(text, "\n{}", format!("{:?}", finding.family).to_lowercase());
+impl Report<'_> {
+    pub(super) fn text(&self) -> String {
+        let mut text = format!(
+            "{}\nsha256 {}, seed {}\n",
+            self.library, self.sha256, self.seed
+        );
+        let mut family = None;
+        for finding in self.checks {
+            if family != Some(finding.family) {
+                family = Some(finding.family);
+                let _ = writeln!(text, "\n{}", format!("{:?}", finding.family).to_lowercase());
+            }
+            text.push_str(&finding.text());
         }
-        let name = finding.outcome.name();
-        let word = if finding.outcome.is_bad() {
-            name.to_uppercase()
-        } else {
-            name.to_owned()
-        };
-        let line = format!("  {word:9}{:32}{}", finding.id, finding.details);
-        let _ = writeln!(text, "{}", line.trim_end());
-        if let Some(replay) = &finding.replay {
-            let _ = writeln!(
-                text,
-                "           {}\n           {replay}",
-                finding.description
-            );
-        }
-        if let Some(capsule) = &finding.capsule {
-            let _ = writeln!(text, "           pilum replay {}", capsule.display());
-        }
+        let counts: Vec<String> = self
+            .counts
+            .iter()
+            .map(|(word, n)| format!("{n} {word}"))
+            .collect();
+        let n: usize = self.counts.values().sum();
+        let _ = writeln!(text, "\n{n} checks: {}", counts.join(", "));
+        text
     }
-    let counts: Vec<String> = report
-        .counts
-        .iter()
-        .map(|(word, n)| format!("{n} {word}"))
-        .collect();
-    let _ = writeln!(
-        text,
-        "\n{} checks: {}",
-        report.counts.values().sum::<usize>(),
-        counts.join(", ")
-    );
-    text
 }

@@ -2,15 +2,15 @@
 //! of the elastic operator.
 
 use super::coverage::beyond_elastic;
-use super::loading_path::Step;
-use super::margins;
-use super::mathematics::{
-    ELASTIC, ITERATED, NEEDS, ROUND_OFF, UPDATE, counts, depends_on_time, flux_scale, increment,
-    largest,
+use super::loading_path::{Step, flux_scale, some, starts};
+use super::mathematics::{NEEDS, counts};
+use super::points::{
+    ELASTIC, ITERATED, ROUND_OFF, UPDATE, apart, carry_on, increment, is_finite, is_success,
+    largest, moved_by,
 };
 use super::random::Random;
-use super::specimen::{INSTANT, Specimen, is_finite, is_success};
-use super::{Check, Family, Found, Subject, Verdict, skipped};
+use super::specimen::{INSTANT, Specimen};
+use super::{Check, Family, Found, Subject, Verdict, counted, margins};
 use abi::raw;
 use law::Tangent;
 use law::probe::{PointEnd, PointStart};
@@ -60,48 +60,36 @@ const NEAR: f64 = 1e-4;
 /// Length of very small increments, relative to those that change the flux by as much unchanged.
 const SMALL: f64 = 1e-6;
 
-/// At most this many steps, evenly.
-fn some(steps: &[Step], most: usize) -> impl Iterator<Item = &Step> {
-    steps.iter().step_by(steps.len().div_ceil(most).max(1))
+/// Very small increments from the ends of steps, on the way back or anywhere.
+fn small_increments(specimen: &Specimen, steps: &[Step], random: &mut Random) -> Vec<PointStart> {
+    let mut points = Vec::new();
+    for step in some(steps, 200) {
+        let length = SMALL * flux_scale(step) / step.stiffness;
+        let last = increment(&step.start);
+        let size = largest(&last);
+        let back: Vec<f64> = last.iter().map(|c| -c / size * length).collect();
+        for by in [back, specimen.direction(length, random)] {
+            let (gradient, end) = (&step.start.gradient1, &step.end);
+            points.push(moved_by(gradient, &by, &end.flux, &end.state));
+        }
+    }
+    points
 }
 
 fn elastic_operator_is_plausible(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "elastic");
-    let mut n = 0;
-    for specimen in subject.specimens_by_default(3, &mut random)? {
-        let steps = specimen.paths(24, &mut random)?.steps;
-        let mut points = Vec::new();
-        for step in some(&steps, 200) {
-            let length = SMALL * flux_scale(step) / step.stiffness;
-            // On the way back, or anywhere.
-            let last = increment(&step.start);
-            let size = largest(&last);
-            let back: Vec<f64> = last.iter().map(|c| -c / size * length).collect();
-            for by in [back, specimen.direction(length, &mut random)] {
-                let gradient1 = step.start.gradient1.iter().zip(&by).map(|(g, d)| g + d);
-                points.push(PointStart {
-                    gradient0: step.start.gradient1.clone(),
-                    gradient1: gradient1.collect(),
-                    flux0: step.end.flux.clone(),
-                    state0: step.end.state.clone(),
-                });
-            }
-        }
+    let n = subject.each_by_default("elastic", 3, |specimen, random| {
+        let steps = specimen.paths(24, random)?.steps;
+        let points = small_increments(specimen, &steps, random);
         let elastic = specimen.call(&points, ELASTIC)?.points;
         let consistent = specimen.call(&points, UPDATE)?.points;
-        let mut unmet = None;
+        let (mut n, mut unmet) = (0, None);
         for ((point, elastic), consistent) in points.iter().zip(&elastic).zip(&consistent) {
             if !(is_success(elastic.status) && is_success(consistent.status)) {
                 continue;
             }
             n += 1;
             if let Some(why) = implausible(elastic) {
-                let verdict = Verdict::Warning(format!(
-                    "{}: {why}, at {}",
-                    specimen.name(),
-                    specimen.at(point)
-                ));
-                return Err(specimen.recorded(point, verdict));
+                return Err(specimen.warns_at(point, why));
             }
             if !is_near(elastic, consistent) {
                 unmet = unmet.or(Some((point, elastic, consistent)));
@@ -122,29 +110,22 @@ fn elastic_operator_is_plausible(subject: &Subject) -> Found {
             && !in_time()?
         {
             let why = format!(
-                "{}: no very small increment, there or back, has the elastic operator for its tangent: \
-                 {:?} and {:?}, at {}",
-                specimen.name(),
-                elastic.tangent,
-                consistent.tangent,
-                specimen.at(point)
+                "no very small increment, there or back, has the elastic operator for its tangent: \
+                 {:?} and {:?}",
+                elastic.tangent, consistent.tangent
             );
-            return Err(specimen.recorded(point, Verdict::Warning(why)));
+            return Err(specimen.warns_at(point, why));
         }
-    }
-    if n == 0 {
-        return Err(skipped("no very small increment succeeded"));
-    }
-    Ok(format!("{n} operators"))
+        Ok(n)
+    })?;
+    counted(n, "operators", "no very small increment succeeded")
 }
 
 /// Whether a tangent is the elastic operator.
 fn is_near(elastic: &PointEnd, consistent: &PointEnd) -> bool {
-    let off = elastic.tangent.iter().zip(&consistent.tangent);
-    let off = off.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
     is_success(elastic.status)
         && is_success(consistent.status)
-        && off <= NEAR * largest(&elastic.tangent)
+        && apart(&elastic.tangent, &consistent.tangent) <= NEAR * largest(&elastic.tangent)
 }
 
 /// What cannot be of an elastic operator.
@@ -216,9 +197,7 @@ impl Piece<'_> {
     /// By how much the flux jumps in it: that much it has changed, and is off.
     fn jump(&self) -> f64 {
         let [(_, a), (_, b)] = &self.ends;
-        let changes = a.flux.iter().zip(&b.flux);
-        let changed = changes.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
-        self.off().min(changed)
+        self.off().min(apart(&a.flux, &b.flux))
     }
 
     /// On both sides of a small jump the law flows alike: it takes another number of substeps.
@@ -244,12 +223,9 @@ impl Piece<'_> {
             return Ok(false);
         }
         let [a, b] = [0, 1].map(|i| &self.ends[i].1.tangent);
-        let unlike = a.iter().zip(b).map(|(a, b)| (a - b).abs());
-        let unlike = unlike.fold(0.0, f64::max);
+        let are_alike = apart(a, b) <= ALIKE * self.step.stiffness.max(largest(a));
         // Routines often have tangents by differences, which such a jump spoils.
-        let is_routine = specimen.law.library().foreign().is_some();
-        let are_alike = unlike <= ALIKE * self.step.stiffness.max(largest(a));
-        Ok(is_routine || are_alike)
+        Ok(specimen.adapter().is_some() || are_alike)
     }
 
     /// The half of it that is farther off the tangent.
@@ -272,17 +248,16 @@ impl Piece<'_> {
         let [(at, a), (_, b)] = &self.ends;
         let start = part(self.step, 1.0);
         let why = format!(
-            "{}: the flux jumps from {:?} to {:?} at the fraction {at:.9} of an increment, \
+            "the flux jumps from {:?} to {:?} at the fraction {at:.9} of an increment, \
              internal variables from {:?} to {:?}; substeps by a tolerance make jumps of its size where branches \
              meet. It goes from {}",
-            specimen.name(),
             a.flux,
             b.flux,
             a.state,
             b.state,
             specimen.at(&start)
         );
-        specimen.recorded(&start, Verdict::Warning(why))
+        specimen.warns_for(&start, why)
     }
 
     /// Something opens or closes in it, or an internal variable switches.
@@ -318,58 +293,46 @@ fn suspicious<'a>(specimen: &Specimen, steps: &[&'a Step]) -> Result<Vec<Piece<'
         pieces.extend(of_step.into_iter().take(SUSPICIOUS));
     }
     for _ in 0..HALVINGS {
-        let middles = pieces
-            .iter()
-            .map(|piece| f64::midpoint(piece.ends[0].0, piece.ends[1].0));
-        let middles: Vec<f64> = middles.collect();
-        let points = pieces
-            .iter()
-            .zip(&middles)
-            .map(|(piece, at)| part(piece.step, *at));
-        let points: Vec<PointStart> = points.collect();
-        let ends = specimen.call(&points, UPDATE)?.points;
-        let halves = pieces.into_iter().zip(middles.into_iter().zip(ends));
-        pieces = halves
-            .map(|(piece, middle)| piece.worse_half(middle))
-            .collect();
+        let middle = |piece: &Piece<'_>| f64::midpoint(piece.ends[0].0, piece.ends[1].0);
+        let points = pieces.iter().map(|piece| part(piece.step, middle(piece)));
+        let ends = specimen.call(&points.collect::<Vec<_>>(), UPDATE)?.points;
+        let halves = pieces.into_iter().zip(ends).map(|(piece, end)| {
+            let at = middle(&piece);
+            piece.worse_half((at, end))
+        });
+        pieces = halves.collect();
     }
     Ok(pieces)
 }
 
 fn response_is_continuous(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "jumps");
-    let (mut n, mut rough) = (0, 0.0_f64);
-    for specimen in subject.specimens_by_default(4, &mut random)? {
-        let steps = specimen.paths(24, &mut random)?.steps;
-        let chosen: Vec<&Step> = some(&steps, 120).collect();
-        n += chosen.len();
-        for piece in &suspicious(&specimen, &chosen)? {
+    let mut rough = 0.0_f64;
+    let n = subject.each_by_default("jumps", 4, |specimen, random| {
+        let steps = specimen.paths(24, random)?.steps;
+        let chosen = some(&steps, 120);
+        for piece in &suspicious(specimen, &chosen)? {
             let jump = piece.jump() / flux_scale(piece.step);
-            if piece.switches(&specimen) {
+            if piece.switches(specimen) {
                 continue;
             }
             if jump <= JUMP {
                 margins::note("jump", jump / JUMP);
-                continue;
-            }
-            if piece.is_between_substeps(&specimen)? {
+            } else if piece.is_between_substeps(specimen)? {
                 margins::note("substeps", jump / SUBSTEPS);
                 rough = rough.max(jump);
-                continue;
+            } else {
+                margins::note("jump", jump / JUMP);
+                return Err(piece.jumps(specimen));
             }
-            margins::note("jump", jump / JUMP);
-            return Err(piece.jumps(&specimen));
         }
-    }
-    if n == 0 {
-        return Err(skipped("no increment succeeded"));
-    }
-    let within = if rough > 0.0 {
-        format!(", with jumps of up to {rough:.0e} of the flux within plastic flow")
+        Ok(chosen.len())
+    })?;
+    let found = counted(n, "increments", "no increment succeeded")?;
+    Ok(if rough > 0.0 {
+        format!("{found}, with jumps of up to {rough:.0e} of the flux within plastic flow")
     } else {
-        String::new()
-    };
-    Ok(format!("{n} increments{within}"))
+        found
+    })
 }
 
 /// How near to a half a half is, and in how many increments it has to be seen.
@@ -377,24 +340,18 @@ const HALF: f64 = 0.02;
 const SEEN: usize = 3;
 
 fn states_are_carried_on(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "halves");
-    let mut n = 0;
-    for specimen in subject.specimens_by_default(3, &mut random)? {
-        let n_states = specimen.probe.n_states();
-        if n_states == 0 {
-            continue;
+    let n = subject.each_by_default("halves", 3, |specimen, random| {
+        let variables = &specimen.formulation.internal_variables;
+        if variables.is_empty() {
+            return Ok(0);
         }
-        let steps = specimen.paths(24, &mut random)?.steps;
-        let chosen: Vec<&Step> = some(&steps, 120).collect();
-        let in_two = in_parts(&specimen, &chosen, 2)?;
-        let in_four = in_parts(&specimen, &chosen, 4)?;
-        n += chosen.len();
-        let is_duration = |k: usize| {
-            let unit = specimen.formulation.internal_variables[k].unit.as_str();
-            ["s", "h", "d"].contains(&unit)
-        };
-        for k in 0..n_states {
-            if counts(&specimen, &steps, k) || is_duration(k) {
+        let steps = specimen.paths(24, random)?.steps;
+        let chosen = some(&steps, 120);
+        let [in_two, in_four] = [2, 4].map(|parts| in_parts(specimen, &chosen, parts));
+        let (in_two, in_four) = (in_two?, in_four?);
+        for (k, variable) in variables.iter().enumerate() {
+            let is_duration = ["s", "h", "d"].contains(&variable.unit.as_str());
+            if counts(specimen, &steps, k) || is_duration {
                 continue;
             }
             // Halved, and changed otherwise.
@@ -418,20 +375,17 @@ fn states_are_carried_on(subject: &Subject) -> Found {
                 && halved.len() >= SEEN.max(other / 4)
             {
                 let why = format!(
-                    "{}: `{}` is {once:e} after an increment, {two:e} if it is done in two, {four:e} in \
+                    "`{}` is {once:e} after an increment, {two:e} if it is done in two, {four:e} in \
                      four: is it added to its value at the start? At {}",
-                    specimen.name(),
-                    specimen.formulation.internal_variables[k].id,
+                    variable.id,
                     specimen.at(&step.start)
                 );
-                return Err(specimen.recorded(&step.start, Verdict::Warning(why)));
+                return Err(specimen.warns_for(&step.start, why));
             }
         }
-    }
-    if n == 0 {
-        return Err(skipped("no law has internal variables"));
-    }
-    Ok(format!("{n} increments"))
+        Ok(chosen.len())
+    })?;
+    counted(n, "increments", "no law has internal variables")
 }
 
 /// Names that mark an internal variable as plastic; it does not change in elasticity.
@@ -461,23 +415,21 @@ fn is_called_plastic(id: &str, doc: &str) -> bool {
 }
 
 fn plastic_variables_rest(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "plastic variables");
-    let mut n = 0;
-    for specimen in subject.specimens_by_default(3, &mut random)? {
+    let n = subject.each_by_default("plastic variables", 3, |specimen, random| {
         let variables = specimen.formulation.internal_variables.iter().enumerate();
         let plastic: Vec<(usize, &str)> = variables
             .filter(|(_, v)| is_called_plastic(&v.id, &v.doc))
             .map(|(k, v)| (k, v.id.as_str()))
             .collect();
         if plastic.is_empty() {
-            continue;
+            return Ok(0);
         }
-        let steps = specimen.paths(24, &mut random)?.steps;
-        let starts: Vec<PointStart> = steps.iter().map(|step| step.start.clone()).collect();
-        if depends_on_time(&specimen, &steps)? {
-            continue;
+        let steps = specimen.paths(24, random)?.steps;
+        if specimen.depends_on_time(&steps)? {
+            return Ok(0);
         }
-        let elastic = specimen.call(&starts, ELASTIC)?.points;
+        let elastic = specimen.call(&starts(&steps), ELASTIC)?.points;
+        let mut n = 0;
         for (step, elastic) in steps.iter().zip(&elastic) {
             let size = largest(&increment(&step.start));
             let off = beyond_elastic(step, elastic);
@@ -492,21 +444,16 @@ fn plastic_variables_rest(subject: &Subject) -> Found {
                 let (before, after) = (step.start.state0[k], step.end.state[k]);
                 if (after - before).abs() > 1e-6 * size {
                     let why = format!(
-                        "{}: `{id}` goes from {before:e} to {after:e} in an increment that is elastic, at {}",
-                        specimen.name(),
-                        specimen.at(&step.start)
+                        "`{id}` goes from {before:e} to {after:e} in an increment that is elastic"
                     );
-                    return Err(specimen.recorded(&step.start, Verdict::Warning(why)));
+                    return Err(specimen.warns_at(&step.start, why));
                 }
             }
         }
-    }
-    if n == 0 {
-        return Err(skipped(
-            "no internal variable is called plastic where increments are elastic",
-        ));
-    }
-    Ok(format!("{n} elastic increments"))
+        Ok(n)
+    })?;
+    let none = "no internal variable is called plastic where increments are elastic";
+    counted(n, "elastic increments", none)
 }
 
 /// Internal variables after increments that are done in this many parts; nothing where the law does not
@@ -529,9 +476,7 @@ fn in_parts(
                 *goes_on = false;
             }
             if *goes_on {
-                point.gradient0.clone_from(&point.gradient1);
-                point.flux0 = end.flux;
-                point.state0 = end.state;
+                carry_on(point, end);
             }
         }
     }

@@ -3,30 +3,27 @@
 //!
 //! Every call goes through the adapter of a run, guard words included, in the process of the check.
 
-mod axes;
-mod messages;
 mod outside_reads;
 mod phase_start;
-mod tangent;
 mod time;
-mod zero_strain;
 
-use super::loading_path::{Refused, Step};
-use super::mathematics::{UPDATE, largest};
+use super::draw::is_known;
+use super::loading_path::{Refused, Step, starts};
+use super::points::{UPDATE, at_rest, bits, first_difference, is_success, largest};
 use super::random::Random;
-use super::specimen::{LONG, Specimen, first_difference, is_success};
-use super::{Check, Family, Found, Subject, Verdict, author_path, refusal, skipped};
+use super::specimen::{LONG, Specimen};
+use super::{
+    Check, Family, Found, Subject, Verdict, author_path, mathematics, refusal, skipped, warned,
+};
 use crate::Error;
-use abi::raw;
 use abi::status::Outcome;
-use law::adapter::{Adapter, sidecar, sidecar_of};
+use law::foreign::{Adapter, sidecar, sidecar_of};
 use law::probe::{Form, PointEnd, PointStart};
 use law::trial::plausible;
 use law::{Bounds, LoadedLaw, Site};
-use messages::{Words, advice};
 use outside_reads::reads_beside;
 use std::path::Path;
-use text::{Source, suggestion};
+use text::Source;
 
 pub(super) const CHECKS: &[Check] = &[
     Check {
@@ -82,7 +79,7 @@ pub(super) const CHECKS: &[Check] = &[
         description: "UMAT: after an update, DSTRAN = 0 keeps STRESS; routines that depend on \
                       time are exempt.",
         needs: &["routine-is-repeatable"],
-        run: zero_strain::routine_stays_at_rest,
+        run: mathematics::routine_stays_at_rest,
     },
     Check {
         id: "time-as-declared",
@@ -100,7 +97,7 @@ pub(super) const CHECKS: &[Check] = &[
                       error), not its transpose, and symmetric if declared. Exempt: kinks and \
                       `tangent = \"approximate\"`.",
         needs: &["routine-is-repeatable"],
-        run: tangent::ddsdde_matches_differences,
+        run: mathematics::ddsdde_matches_differences,
     },
     Check {
         id: "routine-agrees-in-the-plane",
@@ -108,7 +105,7 @@ pub(super) const CHECKS: &[Check] = &[
         description: "UMAT: with fewer components the routine gives the same: plane strain and \
                       axisymmetry as 3d, interface_2d as interface_3d.",
         needs: &["routine-is-repeatable"],
-        run: axes::routine_agrees_in_the_plane,
+        run: mathematics::routine_agrees_in_the_plane,
     },
     Check {
         id: "tangential-directions-are-alike",
@@ -116,7 +113,7 @@ pub(super) const CHECKS: &[Check] = &[
         description: "UMAT: with the tangential directions of an interface turned (in the plane: \
                       reversed), the traction turns alike (warning).",
         needs: &["routine-is-repeatable"],
-        run: axes::tangential_directions_are_alike,
+        run: mathematics::tangential_directions_are_alike,
     },
 ];
 
@@ -185,17 +182,10 @@ pub(super) fn refuse_settings(settings: &[(String, f64)], path: &Path) -> Result
     let Some(Ok(law)) = source.map(|source| sidecar(&source)) else {
         return Ok(());
     };
+    let parameters: Vec<_> = law.parameters.iter().collect();
     for (id, value) in settings {
-        let Some(p) = law.parameters.iter().find(|p| p.id == *id) else {
-            let known = suggestion(id, law.parameters.iter().map(|p| p.id.as_str()));
-            let message =
-                format!("--set {id}={value}: the sidecar names no parameter `{id}`: {known}");
-            return Err(Error::usage(message));
-        };
-        if !p.bounds.contain(*value) {
-            let message = format!("--set {id}={value}: {value} is outside {}", p.bounds);
-            return Err(Error::usage(message));
-        }
+        let nobody = "the sidecar names no parameter";
+        is_known(id, *value, &parameters, nobody).map_err(Error::usage)?;
     }
     Ok(())
 }
@@ -216,28 +206,22 @@ pub(super) fn of_response(check: &Check, subject: &Subject) -> Found {
     (check.run)(subject).map_err(Verdict::milder)
 }
 
-/// Walks of every routine, far too; what is made of each of them.
-fn each(
-    subject: &Subject,
-    name: &str,
-    mut look: impl FnMut(&Specimen, &[Step], &mut Random) -> Result<usize, Verdict>,
-) -> Result<usize, Verdict> {
-    let mut random = Random::new(subject.seed, name);
-    let mut n = 0;
-    for routine in subject.specimens_by_default(1, &mut random)? {
-        let walk = routine.paths(N_INCREMENTS, &mut random)?;
-        if walk.steps.is_empty() {
-            let why = format!("{}: no increment succeeded: {}", routine.name(), walk.why());
-            return Err(skipped(why));
-        }
-        n += look(&routine, &walk.steps, &mut random)?;
+impl Subject {
+    /// Leads every routine along paths, far too. Returns the sum of the counts.
+    pub(super) fn each_walk(
+        &self,
+        name: &str,
+        mut look: impl FnMut(&Specimen, &[Step], &mut Random) -> Result<usize, Verdict>,
+    ) -> Result<usize, Verdict> {
+        self.each_by_default(name, 1, |routine, random| {
+            let walk = routine.paths(N_INCREMENTS, random)?;
+            if walk.steps.is_empty() {
+                let why = format!("{}: no increment succeeded: {}", routine.name(), walk.why());
+                return Err(skipped(why));
+            }
+            look(routine, &walk.steps, random)
+        })
     }
-    Ok(n)
-}
-
-/// Starts of steps.
-fn starts(steps: &[Step]) -> Vec<PointStart> {
-    steps.iter().map(|step| step.start.clone()).collect()
 }
 
 fn sidecar_is_read(subject: &Subject) -> Found {
@@ -258,7 +242,7 @@ fn sidecar_is_read(subject: &Subject) -> Found {
     if groundless.is_empty() {
         return Ok(names);
     }
-    Err(Verdict::Warning(format!(
+    Err(warned(format!(
         "{names}; checked with {}, for which the sidecar has neither `default` nor `usual = [a, b]`, so that what is \
          found may be of no use: write them there, or give values by `--set ID=VALUE` or `--driver FILE`",
         groundless.join(", ")
@@ -290,101 +274,101 @@ fn under_pressure(routine: &Specimen) -> Result<PointStart, Verdict> {
         Ok(state0) => state0,
         Err(why) => return Err(routine.fails(why)),
     };
-    let zero = vec![0.0; flux0.len()];
-    Ok(PointStart {
-        gradient0: zero.clone(),
-        gradient1: zero,
-        flux0,
-        state0,
-    })
+    Ok(at_rest(&vec![0.0; flux0.len()], &flux0, &state0))
 }
 
 fn routine_answers(subject: &Subject) -> Found {
     author_path::is_followed(subject)?;
-    let mut random = Random::new(subject.seed, "answers");
     let mut all = Vec::new();
-    for routine in subject.specimens_by_default(1, &mut random)? {
+    subject.each_by_default("answers", 1, |routine, _| {
         let start = match routine.course.iter().flatten().next() {
             Some(first) => PointStart {
                 gradient1: first.gradient0.clone(),
                 ..first.clone()
             },
-            None => under_pressure(&routine)?,
+            None => under_pressure(routine)?,
         };
-        let answer = routine.call(std::slice::from_ref(&start), UPDATE)?;
+        let one = std::slice::from_ref(&start);
+        let answer = routine.call(one, UPDATE)?;
         if !is_success(answer.status) {
             let why = refusal(answer.status, answer.text().as_deref());
-            let read = reads_beside(&routine, std::slice::from_ref(&start))?;
-            let read = read.map_or(String::new(), |(_, read)| format!("; {read}"));
-            return Err(routine.fails_at(&start, format!("{why}{read}")));
+            let why = format!("{why}{}", what_is_read(routine, one)?);
+            return Err(routine.fails_for(&start, why));
         }
         let stiffness = largest(&answer.points[0].tangent);
         if stiffness <= 0.0 {
             let why = format!(
                 "{} of a call without any strain is zero: the routine leaves it unset, and without it there is no \
                  iteration{}",
-                Words::of(&routine).stiffness,
-                advice(
-                    &routine,
+                routine.words().stiffness,
+                routine.advice(
                     "; an elastic one will do, declared by `tangent = \"approximate\"` in the sidecar"
                 )
             );
-            return Err(routine.fails_at(&start, why));
+            return Err(routine.fails_for(&start, why));
         }
         all.push(format!("{} {stiffness:.3e}", routine.hypothesis.name()));
-    }
+        Ok(0)
+    })?;
     Ok(format!(
         "largest entry of the stiffness: {}",
         all.join(", ")
     ))
 }
 
+/// Reads of a routine next to its arguments at these points, for the end of a sentence.
+fn what_is_read(routine: &Specimen, points: &[PointStart]) -> Result<String, Verdict> {
+    let read = reads_beside(routine, points)?;
+    Ok(read.map_or(String::new(), |(_, read)| format!("; {read}")))
+}
+
 fn routine_stays_inside(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "inside");
-    let (mut n, mut notes) = (0, Vec::new());
-    for routine in subject.specimens_by_default(1, &mut random)? {
-        let near = routine.walk(N_INCREMENTS, &mut random)?;
-        let all = routine.paths(N_INCREMENTS, &mut random)?;
+    let mut overwritten = None;
+    let n = subject.each_by_default("inside", 1, |routine, random| {
+        let near = routine.walk(N_INCREMENTS, random)?;
+        let all = routine.paths(N_INCREMENTS, random)?;
         // Far away results may be no numbers: who goes there is told then.
-        let is_defect = |status: raw::Status, is_near: bool| match Outcome::from_code(status) {
+        let is_defect = |refused: &&Refused, is_near: bool| match Outcome::from_code(refused.status)
+        {
             Outcome::CutStep | Outcome::Domain | Outcome::Unsupported => false,
             Outcome::Numeric => is_near,
             _ => true,
         };
-        let near_ones = near.refusals.iter().map(|refused| (refused, true));
-        let mut refused = near_ones.chain(all.refusals.iter().map(|refused| (refused, false)));
-        if let Some((refused, _)) =
-            refused.find(|(refused, is_near)| is_defect(refused.status, *is_near))
-        {
-            return Err(refuses(&routine, refused)?);
+        let near_one = near
+            .refusals
+            .iter()
+            .find(|refused| is_defect(refused, true));
+        let far_one = || {
+            all.refusals
+                .iter()
+                .find(|refused| is_defect(refused, false))
+        };
+        if let Some(refused) = near_one.or_else(far_one) {
+            return Err(refuses(routine, refused)?);
         }
-        if near.steps.is_empty() && all.steps.is_empty() {
+        let n = near.steps.len() + all.steps.len();
+        if n == 0 {
             let why = format!("{}: no increment succeeded: {}", routine.name(), near.why());
             return Err(skipped(why));
         }
         let some = near.steps.iter().chain(&all.steps);
-        let every = (near.steps.len() + all.steps.len())
-            .div_ceil(MOST_READ)
-            .max(1);
-        let some: Vec<PointStart> = some.step_by(every).map(|step| step.start.clone()).collect();
-        if let Some((start, why)) = reads_beside(&routine, &some)? {
-            let why = format!("{why}, at {}", routine.at(&start));
+        let some = some.step_by(n.div_ceil(MOST_READ).max(1));
+        let some: Vec<PointStart> = some.map(|step| step.start.clone()).collect();
+        if let Some((start, why)) = reads_beside(routine, &some)? {
             return Err(routine.fails_at(&start, why));
         }
-        n += near.steps.len() + all.steps.len();
         let names = routine.probe.take_overwritten();
-        if !names.is_empty() {
-            notes.push(format!(
-                "the routine overwrites {}, which it is given to read; here that is a copy, and what is \
-                 left there is not used",
-                names.join(", ")
-            ));
+        if !names.is_empty() && overwritten.is_none() {
+            overwritten = Some(names.join(", "));
         }
-    }
-    match notes.into_iter().next() {
-        Some(note) => Err(Verdict::Warning(note)),
-        None => Ok(format!("{n} increments")),
-    }
+        Ok(n)
+    })?;
+    overwritten.map_or(Ok(format!("{n} increments")), |names| {
+        Err(warned(format!(
+            "the routine overwrites {names}, which it is given to read; here that is a copy, and what is \
+             left there is not used"
+        )))
+    })
 }
 
 /// The failure of an increment that a routine refuses: alone if it does so alone, too, as is repeated by its
@@ -394,11 +378,10 @@ fn refuses(routine: &Specimen, refused: &Refused) -> Result<Verdict, Verdict> {
     let status = alone.points[0].status;
     let text = alone.text().filter(|_| status == refused.status);
     let why = refusal(refused.status, Some(text.as_ref().unwrap_or(&refused.text)));
-    let read = reads_beside(routine, std::slice::from_ref(&refused.start))?;
-    let read = read.map_or(String::new(), |(_, read)| format!("; {read}"));
+    let read = what_is_read(routine, std::slice::from_ref(&refused.start))?;
     let why = format!("{why}{read}, at {}", routine.at(&refused.start));
     Ok(match text {
-        Some(_) => routine.fails_at(&refused.start, why),
+        Some(_) => routine.fails_for(&refused.start, why),
         None => routine.fails(why),
     })
 }
@@ -424,7 +407,7 @@ fn elsewhere() -> Vec<(Site, usize)> {
 
 /// What first differs between two results, in words.
 fn change(routine: &Specimen, before: &PointEnd, after: &PointEnd) -> String {
-    let words = Words::of(routine);
+    let words = routine.words();
     let results = [
         (words.stress, &before.flux, &after.flux),
         (words.state, &before.state, &after.state),
@@ -438,65 +421,47 @@ fn change(routine: &Specimen, before: &PointEnd, after: &PointEnd) -> String {
         )
 }
 
-fn bits(values: &[f64]) -> Vec<u64> {
-    values.iter().map(|value| value.to_bits()).collect()
-}
-
 fn routine_is_repeatable(subject: &Subject) -> Found {
-    let mut others = subject.specimens_by_default(1, &mut Random::new(subject.seed, "images"))?;
+    let others = subject.specimens_by_default(1, &mut Random::new(subject.seed, "images"))?;
     let mut by_site = None;
-    let n = each(subject, "repeatable", |routine, steps, random| {
-        let fresh = others.iter_mut().find(|other| is_like(other, routine));
+    let n = subject.each_walk("repeatable", |routine, steps, random| {
+        let fresh = others.iter().find(|other| is_like(other, routine));
         // Backwards, so that other calls come before; some with a component that does not move.
         let mut points = starts(steps);
         points.extend(routine.points(24, random)?);
         let expected = routine.call(&points, UPDATE)?.points;
-        let mut back = points.clone();
-        back.reverse();
+        let differs = |found: &[PointEnd], when: &str| {
+            let i = first_difference(&expected, found)?;
+            let what = change(routine, &expected[i], &found[i]);
+            Some((&points[i], format!("{when}: {what}")))
+        };
+        let back: Vec<PointStart> = points.iter().rev().cloned().collect();
         let mut after_others = routine.call(&back, UPDATE)?.points;
         after_others.reverse();
         let in_another_image = match fresh {
             Some(fresh) => fresh.call(&points, UPDATE)?.points,
             None => expected.clone(),
         };
-        for (found, who) in [
-            (&after_others, "after other calls"),
-            (&in_another_image, "in another image"),
-        ] {
-            let Some(i) = first_difference(&expected, found) else {
-                continue;
-            };
-            let what = change(routine, &expected[i], &found[i]);
-            let why = format!(
-                "the same call gives another result {who}: {what}, at {}",
-                routine.at(&points[i])
-            );
-            return Err(routine.fails_at(&points[i], why));
+        let other = differs(&after_others, "after other calls")
+            .or_else(|| differs(&in_another_image, "in another image"));
+        if let Some((start, what)) = other {
+            let why = format!("the same call gives another result {what}");
+            return Err(routine.fails_at(start, why));
         }
         for (site, which) in elsewhere() {
-            let name = Words::of(routine).site[which];
             let form = Form {
                 site: Some(site),
                 ..routine.form(UPDATE)
             };
             let there = routine.probe.integrate(&points, &form)?.points;
-            if let Some(i) = first_difference(&expected, &there) {
-                let why = format!(
-                    "with another {name}: {}, at {}",
-                    change(routine, &expected[i], &there[i]),
-                    routine.at(&points[i])
-                );
-                by_site = by_site
-                    .take()
-                    .or_else(|| Some(routine.warns_at(&points[i], why)));
+            let when = format!("with another {}", routine.words().site[which]);
+            if by_site.is_none()
+                && let Some((start, what)) = differs(&there, &when)
+            {
+                by_site = Some(routine.warns_at(start, what));
             }
         }
         Ok(points.len())
     })?;
     by_site.map_or(Ok(format!("{n} increments")), Err)
-}
-
-/// Whether components differ by more than this.
-fn differ(a: &[f64], b: &[f64], bound: f64) -> bool {
-    a.iter().zip(b).any(|(a, b)| (a - b).abs() > bound)
 }

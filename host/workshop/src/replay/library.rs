@@ -1,111 +1,57 @@
 //! Phases of a library without calls of a law: loading, handshake, entry, description,
 //! `destroy` of null, the end of the process.
 
-use super::probed::refusal_of;
+use super::{Called, Reached, Report};
 use crate::Error;
 use abi::Hypothesis;
 use law::capsule::LibraryCapsule;
-use law::child::{self, Ending, Work};
 use law::probe::call_log::Phase;
 use law::trial::plausible;
 use law::{LoadedLaw, Opener, Trust, hexadecimal_sha256, probe};
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Duration;
 use text::file;
-
-/// Message about a library that exceeds its time limit.
-const STUCK: &str = "the library does not return";
-/// Message as soon as the library has returned; for the end of the process, before that.
-const RETURNED: &str = "it returned";
-const ENDS: &str = "the process ends now";
 
 /// Does the same once more, in another process or, without isolation, in this one.
 pub(super) fn replay(
     path: &Path,
     capsule: &LibraryCapsule,
     opener: &Opener,
-    say: &mut dyn FnMut(&str),
+    report: &mut Report<'_>,
 ) -> Result<(), Error> {
     let part = &capsule.library;
     let Some(limit) = opener.trust().isolate else {
-        return inside(capsule, say);
+        return inside(capsule, report);
     };
     let bytes = file::read_library(&part.path).map_err(|source| text::Error::Unreadable {
         path: part.path.clone(),
         source,
     })?;
-    say(&format!(
-        "library {}: {}",
-        part.path.display(),
-        part.phase.words()
-    ));
+    let (library, phase) = (part.path.display(), part.phase.words());
+    report.say(&format!("library {library}: {phase}"));
     if hexadecimal_sha256(&bytes) != part.sha256 {
-        say(&format!(
+        report.say(&format!(
             "this is another library than that of the capsule: SHA-256 {}",
             part.sha256
         ));
     }
-    say(&super::from(&capsule.origin));
-    let (said, crash) = run(path, limit)?;
-    said.lines().for_each(&mut *say);
+    report.say(&super::from(&capsule.origin));
+    let there = Called::Library.elsewhere(path, limit)?;
+    there.said.lines().for_each(|line| report.say(line));
     let recorded = &capsule.outcome;
-    let Some(crash) = crash else {
-        say(&format!(
+    let Some(crash) = there.crash else {
+        report.say(&format!(
             "nothing fails; it is recorded as `{}`: {}",
             recorded.status, recorded.message
         ));
         return Ok(());
     };
-    if crash == recorded.message {
-        say(&format!("as recorded: `{}`: {crash}", recorded.status));
-    } else {
-        say(&format!("outcome   `internal`: {crash}"));
-        say(&format!(
-            "recorded  `{}`: {}",
-            recorded.status, recorded.message
-        ));
-    }
-    Err(Error::library(format!(
-        "library {} fails: {}",
-        part.path.display(),
-        part.phase.words()
-    )))
-}
-
-/// Does what a capsule says in a separate process: what was said, and how the process ended if the
-/// library ended it.
-///
-/// # Errors
-/// There is no process, or the capsule cannot be used.
-pub(crate) fn run(path: &Path, limit: Duration) -> Result<(String, Option<String>), Error> {
-    let work = Work {
-        arguments: vec!["replay".into(), path.into(), "--in-process".into()],
-        folder: None,
-        variables: Vec::new(),
-        time: limit,
-        memory: None,
-    };
-    let outcome = child::run(&work).map_err(|why| Error::internal(why.to_string()))?;
-    let said = String::from_utf8_lossy(&outcome.stdout).into_owned();
-    let has_returned = said.lines().any(|line| line == RETURNED || line == ENDS);
-    let crash = match outcome.ending {
-        Ending::TimedOut => Some(STUCK.to_owned()),
-        Ending::Signal(_) => Some(format!("the library crashed: {}", outcome.ending)),
-        Ending::Exited(0) if has_returned => None,
-        Ending::Exited(_) => {
-            // The program says why it could not come as far as that.
-            if let (false, Some(why)) = (has_returned, refusal_of(&outcome)) {
-                return Err(Error::usage(why));
-            }
-            Some(format!("the library ended its process: {}", outcome.ending))
-        }
-    };
-    Ok((said, crash))
+    report.compared(recorded, &crash);
+    Err(Error::library(format!("library {library} fails: {phase}")))
 }
 
 /// Does it in this process: what happens is to happen here.
-fn inside(capsule: &LibraryCapsule, say: &mut dyn FnMut(&str)) -> Result<(), Error> {
+fn inside(capsule: &LibraryCapsule, report: &mut Report<'_>) -> Result<(), Error> {
     let part = &capsule.library;
     // What is refused in an orderly way has returned.
     let refused = match (part.phase, part.from_file) {
@@ -128,12 +74,14 @@ fn inside(capsule: &LibraryCapsule, say: &mut dyn FnMut(&str)) -> Result<(), Err
         }
         (Phase::Exit, _) => begin(capsule).err().map(|why| why.to_string()),
     };
-    let is_end = part.phase == Phase::Exit;
-    say(if is_end { ENDS } else { RETURNED });
+    report.say(match part.phase {
+        Phase::Exit => "the process ends now",
+        _ => "it returned",
+    });
     if let Some(why) = refused {
-        say(&format!("it is refused: {why}"));
+        report.say(&format!("it is refused: {why}"));
     }
-    Ok(())
+    report.reached(&Reached::Returned)
 }
 
 /// The laws of the library, called in this process.

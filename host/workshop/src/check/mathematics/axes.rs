@@ -1,128 +1,164 @@
 //! Do hypotheses agree, and does the response turn with the axes?
 
-use super::{ELASTIC, ITERATED, ROUND_OFF, UPDATE, flux_scale, largest};
-use crate::check::loading_path::{Origin, Step, sum};
-use crate::check::margins;
+use crate::check::loading_path::{Origin, Step, flux_scale};
+use crate::check::points::{
+    ELASTIC, ITERATED, ROUND_OFF, apart, carry_on, enlarged, is_success, largest, longer, sum,
+};
 use crate::check::random::Random;
-use crate::check::specimen::{Specimen, create_form, enlarged, hypotheses, is_success};
-use crate::check::{Found, Subject, Verdict, skipped};
+use crate::check::specimen::{Specimen, create_form, hypotheses};
+use crate::check::{Found, Subject, Verdict, counted, margins, refusal};
 use abi::Hypothesis;
 use abi::raw;
-use law::probe::{PointEnd, PointStart};
+use law::probe::PointStart;
 use nalgebra::{DMatrix, DVector};
 
 pub(super) fn hypotheses_agree(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "hypotheses");
-    let specimens = subject.specimens_by_default(3, &mut random)?;
-    let mut n = 0;
-    for specimen in &specimens {
-        let offered = hypotheses(&specimen.law);
-        let wanted = match specimen.hypothesis {
-            Hypothesis::PlaneStrain => [Hypothesis::ThreeD, Hypothesis::Axisymmetric].as_slice(),
-            Hypothesis::Axisymmetric => [Hypothesis::ThreeD].as_slice(),
-            Hypothesis::Interface2d => [Hypothesis::Interface3d].as_slice(),
-            _ => continue,
-        };
-        let larger = wanted
-            .iter()
-            .find_map(|h| offered.iter().find(|(_, o)| o == h));
-        let Some((formulation, hypothesis)) = larger else {
-            continue;
-        };
-        let ids = |f: &law::FormulationDescription| -> Vec<String> {
-            f.internal_variables.iter().map(|v| v.id.clone()).collect()
-        };
-        if ids(formulation) != ids(&specimen.formulation) {
-            continue;
-        }
-        let form = create_form(formulation, *hypothesis, &specimen.values);
-        let Some(probe) = specimen.law.probe(&form)?.probe else {
-            return Err(specimen.fails(format!(
-                "the same parameters are refused under {}",
-                hypothesis.name()
-            )));
-        };
-        let size = hypothesis.n_components();
-        let steps = specimen.paths(24, &mut random)?.steps;
-        let starts: Vec<PointStart> = steps
-            .iter()
-            .map(|step| enlarged(&step.start, size))
-            .collect();
-        let ends = probe.integrate(&starts, &specimen.form(UPDATE))?.points;
-        for (step, end) in steps.iter().zip(&ends) {
-            if let Some(why) = disagreement(step, end, size) {
-                let why = format!(
-                    "{} says otherwise: {why}, at {}",
-                    hypothesis.name(),
-                    specimen.at(&step.start)
-                );
-                return Err(specimen.fails_at(&step.start, why));
-            }
-            n += 1;
-        }
-    }
-    if n == 0 {
-        return Err(skipped("no law offers two hypotheses of one kind"));
-    }
-    Ok(format!("{n} points"))
+    let n = subject.each_by_default("hypotheses", 3, |specimen, random| {
+        agrees(specimen, || Ok(specimen.paths(24, random)?.steps))
+    })?;
+    counted(n, "points", "no law offers two hypotheses of one kind")
 }
 
-/// What differs between a step in the plane and the same in more components.
-fn disagreement(step: &Step, end: &PointEnd, size: usize) -> Option<String> {
-    if !is_success(end.status) {
-        return Some("the update fails".to_owned());
-    }
-    // Not tangents: at an edge of a yield surface, round-off chooses between those of its sides.
-    let bound = ITERATED * flux_scale(step);
-    for c in 0..size {
-        let expected = step.end.flux.get(c).copied().unwrap_or(0.0);
-        if (end.flux[c] - expected).abs() > bound {
-            return Some(format!("flux {:?} and {:?}", step.end.flux, end.flux));
-        }
-    }
-    None
+pub(in crate::check) fn routine_agrees_in_the_plane(subject: &Subject) -> Found {
+    let n = subject.each_walk("plane", |routine, steps, _| {
+        agrees(routine, || Ok(steps.to_vec()))
+    })?;
+    let none = "it is written for the plane or for space, not for both";
+    counted(n, "increments", none)
 }
 
-pub(super) fn tangential_axis_is_arbitrary(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "mirror");
-    let mut n = 0;
-    for mut specimen in subject.specimens_by_default(4, &mut random)? {
-        if !specimen.hypothesis.is_interface() {
-            continue;
+/// Compares steps with the same in more components, if the law offers that. How many.
+fn agrees(
+    specimen: &Specimen,
+    steps: impl FnOnce() -> Result<Vec<Step>, Verdict>,
+) -> Result<usize, Verdict> {
+    let is_routine = specimen.adapter().is_some();
+    let wanted = match specimen.hypothesis {
+        Hypothesis::PlaneStrain if is_routine => &[Hypothesis::ThreeD][..],
+        Hypothesis::PlaneStrain => &[Hypothesis::ThreeD, Hypothesis::Axisymmetric],
+        Hypothesis::Axisymmetric => &[Hypothesis::ThreeD],
+        Hypothesis::Interface2d => &[Hypothesis::Interface3d],
+        _ => return Ok(0),
+    };
+    let offered = hypotheses(&specimen.law);
+    let larger = wanted
+        .iter()
+        .find_map(|h| offered.iter().find(|(_, other)| other == h));
+    let Some((formulation, hypothesis)) = larger else {
+        return Ok(0);
+    };
+    let ids = |f: &law::FormulationDescription| -> Vec<String> {
+        f.internal_variables.iter().map(|v| v.id.clone()).collect()
+    };
+    if ids(formulation) != ids(&specimen.formulation) {
+        return Ok(0);
+    }
+    let form = create_form(formulation, *hypothesis, &specimen.values);
+    let Some(probe) = specimen.law.probe(&form)?.probe else {
+        if is_routine {
+            return Ok(0);
         }
-        let mut random = own_random(subject, "mirror", &mut specimen);
-        // The normal direction stays.
-        let mut signs = vec![-1.0; specimen.probe.n_components()];
+        return Err(specimen.fails(format_args!(
+            "the same parameters are refused under {}",
+            hypothesis.name()
+        )));
+    };
+    let size = hypothesis.n_components();
+    let steps = steps()?;
+    let more: Vec<PointStart> = steps.iter().map(|s| enlarged(&s.start, size)).collect();
+    let answer = probe.integrate(&more, &specimen.form(raw::PILUM_REQ_FLUX))?;
+    for (step, end) in steps.iter().zip(&answer.points) {
+        let expected = longer(&step.end.flux, size);
+        let then = if !is_success(end.status) {
+            refusal(end.status, answer.text().as_deref())
+        } else if apart(&end.flux, &expected) > ITERATED * flux_scale(step) {
+            // Not tangents: at an edge of a yield surface, round-off chooses between those of its sides.
+            format!("it is {:?}", end.flux)
+        } else {
+            continue;
+        };
+        let why = format!(
+            "{} is {:?}, under {} {then}",
+            specimen.words().stress,
+            step.end.flux,
+            hypothesis.name()
+        );
+        return Err(specimen.fails_at(&step.start, why));
+    }
+    Ok(steps.len())
+}
+
+/// How stresses and strains turn with the axes.
+struct Turn {
+    of_fluxes: DMatrix<f64>,
+    of_gradients: DMatrix<f64>,
+}
+
+impl Turn {
+    /// One of an interface, whose normal direction stays.
+    fn of_interface(turn: DMatrix<f64>) -> Self {
+        Self {
+            of_fluxes: turn.clone(),
+            of_gradients: turn,
+        }
+    }
+
+    /// An interface with its tangential directions reversed.
+    fn reversed(n_components: usize) -> Self {
+        let mut signs = DVector::from_element(n_components, -1.0);
         signs[0] = 1.0;
-        let mirror = DMatrix::from_diagonal(&DVector::from_vec(signs));
-        for _ in 0..TWINS {
-            n += twin(
-                &specimen,
-                &mirror,
-                &mirror,
-                ("mirrored", ROUND_OFF),
-                &mut random,
-            )?
-            .map_err(|unlike| {
-                margins::note(unlike.part.0, unlike.part.1);
-                let why = unlike.words(&specimen);
-                specimen.recorded(&unlike.start, Verdict::Warning(why))
-            })?;
+        Self::of_interface(DMatrix::from_diagonal(&signs))
+    }
+
+    /// An interface turned about its normal; reversed in the plane.
+    fn about_normal(n_components: usize, angle: f64) -> Self {
+        if n_components != 3 {
+            return Self::reversed(n_components);
+        }
+        let (sin, cos) = f64::sin_cos(angle);
+        let turn = [1.0, 0.0, 0.0, 0.0, cos, -sin, 0.0, sin, cos];
+        Self::of_interface(DMatrix::from_row_slice(3, 3, &turn))
+    }
+
+    /// A rotation of space, about axis 3 if components are those of a plane: how it turns stresses, and
+    /// strains with γ = 2ε.
+    fn of_space(n_components: usize, random: &mut Random) -> Self {
+        let mut angle = || random.between(0.0, std::f64::consts::TAU);
+        let turn = if n_components == 4 {
+            nalgebra::Rotation3::from_euler_angles(0.0, 0.0, angle())
+        } else {
+            nalgebra::Rotation3::from_euler_angles(angle(), angle(), angle())
+        };
+        let q = turn.matrix();
+        // 11, 22, 33, 12, 13, 23.
+        let pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
+        let of_fluxes = DMatrix::from_fn(n_components, n_components, |row, column| {
+            let ((i, j), (k, l)) = (pairs[row], pairs[column]);
+            let once = q[(i, k)] * q[(j, l)];
+            if k == l {
+                once
+            } else {
+                once + q[(i, l)] * q[(j, k)]
+            }
+        });
+        let of_gradients = DMatrix::from_fn(n_components, n_components, |row, column| {
+            let double = |c: usize| if c < 3 { 1.0 } else { 2.0 };
+            of_fluxes[(row, column)] * double(row) / double(column)
+        });
+        Self {
+            of_fluxes,
+            of_gradients,
         }
     }
-    if n == 0 {
-        return Err(skipped("there is no interface law"));
-    }
-    Ok(format!("{n} points"))
+}
+
+fn turned(by: &DMatrix<f64>, values: &[f64]) -> Vec<f64> {
+    (by * DVector::from_row_slice(values)).as_slice().to_vec()
 }
 
 /// Numbers that depend on the hypothesis alone, so that a replay of one of its increments finds it again on the way
 /// of the whole check: it has no other.
-pub(in crate::check) fn own_random(
-    subject: &Subject,
-    name: &str,
-    specimen: &mut Specimen,
-) -> Random {
+fn own_random(subject: &Subject, name: &str, specimen: &mut Specimen) -> Random {
     if subject.at.is_some() {
         specimen.course = None;
     }
@@ -131,35 +167,59 @@ pub(in crate::check) fn own_random(
 }
 
 /// Pairs of points that are led side by side, and the increments of each.
-const TWINS: usize = 24;
-const TWIN_INCREMENTS: usize = 8;
-/// Differences of fluxes after several increments, relative to the fluxes in play: substeps whose number
-/// follows from a tolerance need not be the same in other axes.
-const ROTATED: f64 = 1e-4;
+struct Twins {
+    n: usize,
+    increments: usize,
+    /// Differences of fluxes, relative to the fluxes in play, and the name of this threshold.
+    tolerance: f64,
+    name: Option<&'static str>,
+}
+
+const MIRRORED: Twins = Twins {
+    n: 24,
+    increments: 8,
+    tolerance: ROUND_OFF,
+    name: Some("mirrored"),
+};
+/// Substeps whose number follows from a tolerance need not be the same in other axes.
+const ROTATED: Twins = Twins {
+    n: 24,
+    increments: 8,
+    tolerance: 1e-4,
+    name: Some("rotated"),
+};
+const OF_ROUTINES: Twins = Twins {
+    n: 200,
+    increments: 1,
+    tolerance: ITERATED,
+    name: None,
+};
 
 /// Fluxes of a point and of its image that do not belong together.
 struct Unlike {
     /// How far, as a part of the threshold of this name.
-    part: (&'static str, f64),
+    part: (Option<&'static str>, f64),
     start: PointStart,
-    flux: Vec<f64>,
-    image: Vec<f64>,
-    expected: Vec<f64>,
+    /// Flux of the point, the same turned, and that of the image.
+    fluxes: [Vec<f64>; 3],
 }
 
 impl Unlike {
-    fn words(&self, specimen: &Specimen) -> String {
-        let Self {
-            flux,
-            image,
-            expected,
-            ..
-        } = self;
-        format!(
-            "{}: flux {flux:?}, turned {expected:?}, is {image:?} where the increment is turned, at {}",
-            specimen.name(),
+    /// The warning, with a hint.
+    fn warns(self, specimen: &Specimen, hint: &str) -> Verdict {
+        note(self.part);
+        let [flux, expected, image] = &self.fluxes;
+        let why = format!(
+            "flux {flux:?}, turned {expected:?}, is {image:?} where the increment is turned, at {}{hint}",
             specimen.at(&self.start)
-        )
+        );
+        specimen.warns_for(&self.start, why)
+    }
+}
+
+fn note((name, part): (Option<&'static str>, f64)) {
+    if let Some(name) = name {
+        margins::note(name, part);
     }
 }
 
@@ -167,14 +227,13 @@ impl Unlike {
 /// change of axes along that of the path. Increments at which both were compared.
 fn twin(
     specimen: &Specimen,
-    of_fluxes: &DMatrix<f64>,
-    of_gradients: &DMatrix<f64>,
-    (name, tolerance): (&'static str, f64),
+    Turn {
+        of_fluxes,
+        of_gradients,
+    }: &Turn,
+    twins: &Twins,
     random: &mut Random,
 ) -> Result<Result<usize, Unlike>, Verdict> {
-    let turned = |by: &DMatrix<f64>, values: &[f64]| -> Vec<f64> {
-        (by * DVector::from_row_slice(values)).as_slice().to_vec()
-    };
     let origin = specimen.origin(random)?;
     // An initial flux with a direction, if the law can start there; else the pressure alone.
     let pressure = largest(&origin.start.flux0);
@@ -183,92 +242,83 @@ fn twin(
         let part = if c < specimen.n_normal() { 0.2 } else { 0.1 };
         *value += part * pressure * random.between(-1.0, 1.0);
     }
-    let directed = specimen.started(flux)?.unwrap_or(origin);
-    let image = specimen.started(turned(of_fluxes, &directed.start.flux0))?;
-    // A law may refuse what a little rounding adds.
-    let Ok(Origin {
-        start: mut second, ..
-    }) = image
-    else {
-        return Ok(Ok(0));
-    };
+    let directed = specimen.started(&flux)?.unwrap_or(origin);
     let Origin {
         start: mut first,
         stiffness,
         size,
     } = directed;
-    let mut n = 0;
+    // A law may refuse what a little rounding adds.
+    let Ok(image) = specimen.started(&turned(of_fluxes, &first.flux0))? else {
+        return Ok(Ok(0));
+    };
+    let mut second = image.start;
     let mut move_ = Vec::new();
-    for increment in 0..TWIN_INCREMENTS {
-        if increment % 4 == 0 {
+    for n in 0..twins.increments {
+        if n % 4 == 0 {
             move_ = specimen.direction(size * random.logarithmic(0.03, 100.0), random);
         }
         first.gradient1 = sum(&first.gradient0, &move_);
         second.gradient1 = sum(&second.gradient0, &turned(of_gradients, &move_));
-        let mut ends = specimen
-            .call(
-                &[first.clone(), second.clone()],
-                raw::PILUM_REQ_FLUX | raw::PILUM_REQ_ELASTIC,
-            )?
-            .points;
-        let (Some(b), Some(a)) = (ends.pop(), ends.pop()) else {
-            break;
+        let answer = specimen.call(&[first.clone(), second.clone()], ELASTIC)?;
+        let Ok([a, b]) = <[_; 2]>::try_from(answer.points) else {
+            return Ok(Ok(n));
         };
         if !(is_success(a.status) && is_success(b.status)) {
-            break;
+            return Ok(Ok(n));
         }
         let expected = turned(of_fluxes, &a.flux);
         let scale = largest(&a.flux)
             .max(largest(&first.flux0))
             .max(stiffness * largest(&move_));
-        let pairs = expected.iter().zip(&b.flux);
-        let off = pairs.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
-        if off > tolerance * scale || off.is_nan() {
+        let (off, allowed) = (apart(&expected, &b.flux), twins.tolerance * scale);
+        let part = (twins.name, off / allowed);
+        if off > allowed {
             return Ok(Err(Unlike {
-                part: (name, off / (tolerance * scale)),
+                part,
                 start: second,
-                flux: a.flux,
-                image: b.flux,
-                expected,
+                fluxes: [a.flux, expected, b.flux],
             }));
         }
-        margins::note(name, off / (tolerance * scale));
-        n += 1;
-        for (point, end) in [(&mut first, a), (&mut second, b)] {
-            point.gradient0.clone_from(&point.gradient1);
-            point.flux0 = end.flux;
-            point.state0 = end.state;
-        }
+        note(part);
+        carry_on(&mut first, a);
+        carry_on(&mut second, b);
     }
-    Ok(Ok(n))
+    Ok(Ok(twins.increments))
 }
 
-/// A rotation of space, about axis 3 if components are those of a plane: how it turns stresses, and
-/// strains with γ = 2ε.
-fn rotation(n_components: usize, random: &mut Random) -> (DMatrix<f64>, DMatrix<f64>) {
-    let mut angle = || random.between(0.0, std::f64::consts::TAU);
-    let turn = if n_components == 4 {
-        nalgebra::Rotation3::from_euler_angles(0.0, 0.0, angle())
-    } else {
-        nalgebra::Rotation3::from_euler_angles(angle(), angle(), angle())
-    };
-    let q = turn.matrix();
-    // 11, 22, 33, 12, 13, 23.
-    let pairs = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
-    let stress = DMatrix::from_fn(n_components, n_components, |row, column| {
-        let ((i, j), (k, l)) = (pairs[row], pairs[column]);
-        let once = q[(i, k)] * q[(j, l)];
-        if k == l {
-            once
-        } else {
-            once + q[(i, l)] * q[(j, k)]
+/// Compares interfaces with the same in other tangential directions: at how many increments.
+fn turned_alike(
+    subject: &Subject,
+    (name, n_sets): (&str, usize),
+    twins: &Twins,
+    turn: impl Fn(usize, &mut Random) -> Turn,
+) -> Result<usize, Verdict> {
+    let mut random = Random::new(subject.seed, name);
+    let mut n = 0;
+    for mut specimen in subject.specimens_by_default(n_sets, &mut random)? {
+        if !specimen.hypothesis.is_interface() {
+            continue;
         }
-    });
-    let strain = DMatrix::from_fn(n_components, n_components, |row, column| {
-        let double = |c: usize| if c < 3 { 1.0 } else { 2.0 };
-        stress[(row, column)] * double(row) / double(column)
-    });
-    (stress, strain)
+        let mut random = own_random(subject, name, &mut specimen);
+        for _ in 0..twins.n {
+            let turn = turn(specimen.probe.n_components(), &mut random);
+            n += twin(&specimen, &turn, twins, &mut random)?
+                .map_err(|unlike| unlike.warns(&specimen, ""))?;
+        }
+    }
+    Ok(n)
+}
+
+pub(super) fn tangential_axis_is_arbitrary(subject: &Subject) -> Found {
+    let n = turned_alike(subject, ("mirror", 4), &MIRRORED, |n, _| Turn::reversed(n))?;
+    counted(n, "points", "there is no interface law")
+}
+
+pub(in crate::check) fn tangential_directions_are_alike(subject: &Subject) -> Found {
+    let turn = |n: usize, random: &mut Random| Turn::about_normal(n, random.between(0.5, 2.5));
+    let n = turned_alike(subject, ("turned", 1), &OF_ROUTINES, turn)?;
+    counted(n, "increments", "it is no routine of interfaces")
 }
 
 pub(super) fn response_is_isotropic(subject: &Subject) -> Found {
@@ -280,53 +330,45 @@ pub(super) fn response_is_isotropic(subject: &Subject) -> Found {
             continue;
         }
         let mut random = own_random(subject, "isotropy", &mut specimen);
-        for _ in 0..TWINS {
-            let (of_fluxes, of_gradients) = rotation(components, &mut random);
-            let mut found = twin(
-                &specimen,
-                &of_fluxes,
-                &of_gradients,
-                ("rotated", ROTATED),
-                &mut random,
-            )?;
+        for _ in 0..ROTATED.n {
+            let mut attempt = || {
+                let turn = Turn::of_space(components, &mut random);
+                twin(&specimen, &turn, &ROTATED, &mut random)
+            };
+            let mut found = attempt()?;
             // Where a law branches, rounding may take the other branch: a fault shows again and again.
             for _ in 0..2 {
                 if found.is_err() {
-                    let (of_fluxes, of_gradients) = rotation(components, &mut random);
-                    found = twin(
-                        &specimen,
-                        &of_fluxes,
-                        &of_gradients,
-                        ("rotated", ROTATED),
-                        &mut random,
-                    )?;
+                    found = attempt()?;
                 }
             }
             n += found.map_err(|unlike| {
-                margins::note(unlike.part.0, unlike.part.1);
-                let hint = shear_factor(&specimen, &mut random).map_or(String::new(), |factor| {
-                    let taken = if (factor - 2.0).abs() < 1e-3 || (factor - 0.5).abs() < 1e-3 {
-                        ": they are handed over as γ, and not as ε"
-                    } else {
-                        ""
-                    };
-                    format!(
-                        "; the shear modulus is {factor:.3} times (D11 − D12)/2, where shear \
-                         strains are γ = 2ε{taken}"
-                    )
-                });
-                let verdict = Verdict::Warning(format!(
-                    "{}{hint}; a law that is meant to have directions says so in its `doc`",
-                    unlike.words(&specimen)
-                ));
-                specimen.recorded(&unlike.start, verdict)
+                let hint = shear_hint(&specimen, &mut random);
+                let meant = "a law that is meant to have directions says so in its `doc`";
+                unlike.warns(&specimen, &format!("{hint}; {meant}"))
             })?;
         }
     }
-    if n == 0 {
-        return Err(skipped("no law of solids is without axes of its own"));
-    }
-    Ok(format!("{n} increments"))
+    counted(
+        n,
+        "increments",
+        "no law of solids is without axes of its own",
+    )
+}
+
+/// Hint at a shear modulus that does not fit the normal components; empty if it fits.
+fn shear_hint(specimen: &Specimen, random: &mut Random) -> String {
+    let Some(factor) = shear_factor(specimen, random) else {
+        return String::new();
+    };
+    let taken = if (factor - 2.0).abs() < 1e-3 || (factor - 0.5).abs() < 1e-3 {
+        ": they are handed over as γ, and not as ε"
+    } else {
+        ""
+    };
+    format!(
+        "; the shear modulus is {factor:.3} times (D11 − D12)/2, where shear strains are γ = 2ε{taken}"
+    )
 }
 
 /// Part of the increment that doubles the flux, for differences of fluxes.

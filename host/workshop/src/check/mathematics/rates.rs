@@ -1,10 +1,11 @@
 //! Are rates the derivative of the update?
 
-use super::{LENGTHS, increment, largest};
+use super::LENGTHS;
 use crate::check::loading_path::Step;
+use crate::check::points::{increment, is_success, largest};
 use crate::check::random::Random;
-use crate::check::specimen::{Specimen, create_form, is_success};
-use crate::check::{Found, Subject, Verdict, refusal, skipped};
+use crate::check::specimen::Specimen;
+use crate::check::{Found, Subject, Verdict, refusal, skipped, warned};
 use abi::raw;
 use law::probe::{Form, PointRates, PointStart};
 
@@ -13,28 +14,61 @@ use law::probe::{Form, PointRates, PointStart};
 const RATE: f64 = 1e-6;
 
 pub(super) fn rates_match_differences(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "rates");
-    let (mut n, mut n_kinks) = (0, 0);
-    for specimen in subject.specimens_by_default(4, &mut random)? {
+    let mut n_kinks = 0;
+    let n = subject.each_by_default("rates", 4, |specimen, random| {
         // They are asked for over an increment of one unit of time.
         if !specimen.formulation.rates || specimen.time_increment.to_bits() != 1.0_f64.to_bits() {
-            continue;
+            return Ok(0);
         }
-        let steps = specimen.paths(36, &mut random)?.steps;
-        for step in steps.iter().step_by(5) {
+        let mut n = 0;
+        for step in specimen.paths(36, random)?.steps.iter().step_by(5) {
             n += 1;
-            n_kinks += usize::from(!one_direction(&specimen, step, &mut random)?);
+            n_kinks += usize::from(!one_direction(specimen, step, random)?);
         }
-    }
+        Ok(n)
+    })?;
+    let details = format!("{n} directions, {n_kinks} at kinks");
     if n == 0 {
-        return Err(skipped("no law declares rates"));
+        Err(skipped("no law declares rates"))
+    } else if 2 * n_kinks > n {
+        Err(warned(format!("too few were compared: {details}")))
+    } else {
+        Ok(details)
     }
-    if 2 * n_kinks > n {
-        return Err(Verdict::Warning(format!(
-            "too few were compared: {n} directions, {n_kinks} at kinks"
-        )));
+}
+
+/// Direction in which the inputs of an update move.
+struct Direction {
+    point: PointRates,
+    parameter: Vec<f64>,
+}
+
+impl Direction {
+    /// A random one, for increments and fluxes of this size.
+    fn new(
+        specimen: &Specimen,
+        start: &PointStart,
+        [size, flux]: [f64; 2],
+        random: &mut Random,
+    ) -> Self {
+        // Each input moves by a part of its own size; choices, and what is left out, stay.
+        let mut part = |scale: f64| scale * random.between(-1.0, 1.0);
+        let parameters = specimen.law.description().parameters.iter();
+        let parameter: Vec<f64> = parameters
+            .zip(&specimen.values)
+            .map(|(p, value)| {
+                let moves = p.choices.is_empty() && value.is_finite() && *value != 0.0;
+                if moves { part(0.1 * value.abs()) } else { 0.0 }
+            })
+            .collect();
+        let point = PointRates {
+            gradient0: start.gradient0.iter().map(|_| part(size)).collect(),
+            gradient1: start.gradient0.iter().map(|_| part(size)).collect(),
+            flux0: start.flux0.iter().map(|_| part(0.1 * flux)).collect(),
+            state0: start.state0.iter().map(|s| part(0.1 * s.abs())).collect(),
+        };
+        Self { point, parameter }
     }
-    Ok(format!("{n} directions, {n_kinks} at kinks"))
 }
 
 /// Compares the rates of a step in a random direction with differences. `false`: at a kink.
@@ -42,33 +76,17 @@ fn one_direction(specimen: &Specimen, step: &Step, random: &mut Random) -> Resul
     let start = &step.start;
     let size = largest(&increment(start));
     let flux = largest(&start.flux0).max(step.stiffness * size);
-    // Each input moves by a part of its own size; choices, and what is left out, stay.
-    let mut part = |scale: f64| scale * random.between(-1.0, 1.0);
-    let parameters = specimen.law.description().parameters.iter();
-    let parameter: Vec<f64> = parameters
-        .zip(&specimen.values)
-        .map(|(p, value)| {
-            let moves = p.choices.is_empty() && value.is_finite() && *value != 0.0;
-            if moves { part(0.1 * value.abs()) } else { 0.0 }
-        })
-        .collect();
-    let state: Vec<f64> = start.state0.iter().map(|s| 0.1 * s.abs()).collect();
-    let direction = PointRates {
-        gradient0: start.gradient0.iter().map(|_| part(size)).collect(),
-        gradient1: start.gradient0.iter().map(|_| part(size)).collect(),
-        flux0: start.flux0.iter().map(|_| part(0.1 * flux)).collect(),
-        state0: state.into_iter().map(part).collect(),
-    };
+    let Direction { point, parameter } = Direction::new(specimen, start, [size, flux], random);
     let (answer, rates) = specimen.probe.rates(
         std::slice::from_ref(start),
-        std::slice::from_ref(&direction),
+        std::slice::from_ref(&point),
         &parameter,
     )?;
     let ([end], [(flux_rate, state_rate)]) = (answer.points.as_slice(), rates.as_slice()) else {
         return Err(specimen.fails("no rates are written"));
     };
     if !is_success(end.status) {
-        return Err(specimen.fails(format!(
+        return Err(specimen.fails(format_args!(
             "with rates `integrate` returned {}",
             refusal(answer.status, answer.text().as_deref())
         )));
@@ -91,7 +109,7 @@ fn one_direction(specimen: &Specimen, step: &Step, random: &mut Random) -> Resul
         .collect();
     let mut verdict = Ok(false);
     for length in LENGTHS {
-        let moved = |sign: f64| moved_end(specimen, start, &direction, &parameter, sign * length);
+        let moved = |sign: f64| moved_end(specimen, start, &point, &parameter, sign * length);
         let (Some(above), Some(below)) = (moved(1.0)?, moved(-1.0)?) else {
             continue;
         };
@@ -111,9 +129,9 @@ fn one_direction(specimen: &Specimen, step: &Step, random: &mut Random) -> Resul
             return Ok(true);
         }
         if disagreement <= 0.1 * error {
-            verdict = Err(specimen.fails(format!(
+            verdict = Err(specimen.fails(format_args!(
                 "rate {worst} of flux and internal variables is {:.9e}, differences say otherwise by \
-                 {error:.1e} of it, at {} in the direction {direction:?}, parameters \
+                 {error:.1e} of it, at {} in the direction {point:?}, parameters \
                  {parameter:?}",
                 found[worst],
                 specimen.at(start)
@@ -137,8 +155,7 @@ fn moved_end(
         pairs.map(|(value, rate)| value + length * rate).collect()
     };
     let values = along(&specimen.values, parameter);
-    let form = create_form(&specimen.formulation, specimen.hypothesis, &values);
-    let Some(probe) = specimen.law.probe(&form)?.probe else {
+    let Some(probe) = specimen.with_values(&values)? else {
         return Ok(None);
     };
     let point = PointStart {

@@ -1,10 +1,11 @@
 //! Are signs, angles and work what they are meant to be?
 
-use super::{ELASTIC, ITERATED, ROUND_OFF, depends_on_time, flux_scale, increment, largest};
-use crate::check::loading_path::Origin;
-use crate::check::random::Random;
-use crate::check::specimen::{Specimen, create_form, is_success};
-use crate::check::{Found, Subject, Verdict, skipped};
+use crate::check::loading_path::{Origin, Step, flux_scale, starts};
+use crate::check::points::{
+    ELASTIC, ITERATED, ROUND_OFF, apart, carry_on, increment, is_success, largest,
+};
+use crate::check::specimen::Specimen;
+use crate::check::{Found, Subject, Verdict, counted, skipped, warned};
 use abi::raw;
 use law::probe::PointStart;
 use nalgebra::{DMatrix, DVector};
@@ -13,51 +14,52 @@ use nalgebra::{DMatrix, DVector};
 const STRONGER: f64 = 1.05;
 
 pub(super) fn compression_is_negative(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "compression");
-    let mut n = 0;
-    for specimen in subject.specimens_by_default(4, &mut random)? {
+    const PRESSURES: [f64; 3] = [10.0, 100.0, 1000.0];
+    let n = subject.each_by_default("compression", 4, |specimen, _| {
         // A replay goes the ways of the whole check, in which nothing is random.
         if specimen.course.is_some() && subject.at.is_none() {
             return Err(skipped("the path is the author's"));
         }
-        for pressure in [10.0, 100.0, 1000.0] {
-            let origin = |pressure: f64| specimen.started(specimen.under_pressure(pressure));
-            let (compressed, pulled) = (origin(pressure)?.ok(), origin(-pressure)?.ok());
-            // The same way for both: where dilation is held, shear stresses grow with its length.
-            let both = compressed.iter().chain(&pulled);
-            let size = both.fold(0.0_f64, |most, origin| most.max(origin.size));
-            let sheared = |origin| sheared_far(&specimen, origin, size);
-            let compressed = compressed.map(sheared).transpose()?;
-            let pulled = pulled.map(sheared).transpose()?;
-            let found = match (compressed, pulled) {
-                (None, Some(pulled)) => pulled.into_iter().next().map(|(start, _)| {
-                    let why = format!(
-                        "it starts from a tension of {pressure} kPa, but not from as much compression"
-                    );
-                    (start, why)
-                }),
-                (Some(compressed), Some(pulled)) => {
-                    let mut pairs = compressed.into_iter().zip(pulled);
-                    let stronger = pairs.find(|((_, c), (_, p))| *p > STRONGER * c);
-                    stronger.map(|((_, compressed), (start, pulled))| {
-                        let why = format!(
-                            "under a tension of {pressure} kPa it carries a shear stress of \
-                             {pulled:.6e} kPa, under as much compression {compressed:.6e}"
-                        );
-                        (start, why)
-                    })
-                }
-                _ => None,
-            };
-            if let Some((start, why)) = found {
-                let name = specimen.name();
-                let why = format!("{name}: {why}; compression is negative here");
-                return Err(specimen.recorded(&start, Verdict::Warning(why)));
+        for pressure in PRESSURES {
+            if let Some((start, why)) = is_stronger_in_tension(specimen, pressure)? {
+                let why = format!("{why}; compression is negative here");
+                return Err(specimen.warns_for(&start, why));
             }
-            n += 1;
         }
-    }
+        Ok(PRESSURES.len())
+    })?;
     Ok(format!("{n} pressures"))
+}
+
+/// The increment at which a law carries more in tension than under as much pressure, in words.
+fn is_stronger_in_tension(
+    specimen: &Specimen,
+    pressure: f64,
+) -> Result<Option<(PointStart, String)>, Verdict> {
+    let origin = |pressure: f64| specimen.started(&specimen.under_pressure(pressure));
+    let (compressed, pulled) = (origin(pressure)?.ok(), origin(-pressure)?.ok());
+    // The same way for both: where dilation is held, shear stresses grow with its length.
+    let both = compressed.iter().chain(&pulled);
+    let size = both.fold(0.0_f64, |most, origin| most.max(origin.size));
+    let sheared = |origin| sheared_far(specimen, origin, size);
+    let compressed = compressed.map(sheared).transpose()?;
+    let Some(pulled) = pulled.map(sheared).transpose()? else {
+        return Ok(None);
+    };
+    let Some(compressed) = compressed else {
+        let why =
+            format!("it starts from a tension of {pressure} kPa, but not from as much compression");
+        return Ok(pulled.into_iter().next().map(|(start, _)| (start, why)));
+    };
+    let mut pairs = compressed.into_iter().zip(pulled);
+    let stronger = pairs.find(|((_, c), (_, p))| *p > STRONGER * c);
+    Ok(stronger.map(|((_, compressed), (start, pulled))| {
+        let why = format!(
+            "under a tension of {pressure} kPa it carries a shear stress of \
+             {pulled:.6e} kPa, under as much compression {compressed:.6e}"
+        );
+        (start, why)
+    }))
 }
 
 /// Shears a point, at constant other gradients, far beyond its elastic range, which has this size: every
@@ -81,9 +83,7 @@ fn sheared_far(
         };
         let before = way.last().map_or(0.0, |(_, most)| *most);
         way.push((point.clone(), before.max(end.flux[shear].abs())));
-        point.gradient0.clone_from(&point.gradient1);
-        point.flux0 = end.flux;
-        point.state0 = end.state;
+        carry_on(&mut point, end);
         length *= 1.5;
     }
     Ok(way)
@@ -97,100 +97,86 @@ const PERIODS: [f64; 2] = [
 ];
 
 pub(super) fn angles_are_degrees(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "angles");
-    let mut n = 0;
-    for specimen in subject.specimens_by_default(3, &mut random)? {
-        let angles = specimen.law.description().parameters.iter().enumerate();
-        let angles: Vec<usize> = angles
-            .filter(|(i, p)| p.unit == "deg" && specimen.values[*i].is_finite())
-            .map(|(i, _)| i)
-            .collect();
+    let n = subject.each_by_default("angles", 3, |specimen, random| {
+        let parameters = specimen.law.description().parameters.iter().enumerate();
+        let is_angle = |(i, p): &(usize, &law::ParameterDescription)| {
+            p.unit == "deg" && specimen.values[*i].is_finite()
+        };
+        let angles: Vec<_> = parameters.filter(is_angle).collect();
         if angles.is_empty() {
-            continue;
+            return Ok(0);
         }
-        let steps = specimen.paths(12, &mut random)?.steps;
-        for i in angles {
-            // The largest difference that another value of the angle makes; nothing where it is refused.
-            let effect = |by: f64| -> Result<Option<f64>, Verdict> {
-                let mut values = specimen.values.clone();
-                values[i] += by;
-                if !specimen.law.description().parameters[i]
-                    .bounds
-                    .contain(values[i])
-                {
-                    return Ok(None);
-                }
-                let form = create_form(&specimen.formulation, specimen.hypothesis, &values);
-                let Some(probe) = specimen.law.probe(&form)?.probe else {
-                    return Ok(None);
+        let steps = specimen.paths(12, random)?.steps;
+        let mut n = 0;
+        for (i, p) in angles {
+            for by in PERIODS.into_iter().flat_map(|period| [period, -period]) {
+                // Half a period less a little: neither does the tangent repeat there.
+                let (Some(whole), Some(part)) = (
+                    effect(specimen, &steps, i, by)?,
+                    effect(specimen, &steps, i, 0.4 * by)?,
+                ) else {
+                    continue;
                 };
-                let starts: Vec<PointStart> = steps.iter().map(|s| s.start.clone()).collect();
-                let ends = probe.integrate(&starts, &specimen.form(raw::PILUM_REQ_FLUX))?;
-                let differences = steps.iter().zip(&ends.points).map(|(step, end)| {
-                    if !is_success(end.status) {
-                        return f64::INFINITY;
-                    }
-                    let pairs = step.end.flux.iter().zip(&end.flux);
-                    let most = pairs.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
-                    most / flux_scale(step)
-                });
-                Ok(Some(differences.fold(0.0, f64::max)))
-            };
-            for period in PERIODS {
-                for by in [period, -period] {
-                    // Half a period less a little: neither does the tangent repeat there.
-                    let (Some(whole), Some(part)) = (effect(by)?, effect(0.4 * by)?) else {
-                        continue;
-                    };
-                    n += 1;
-                    if whole < ITERATED && part > 1e3 * ITERATED {
-                        let p = &specimen.law.description().parameters[i];
-                        return Err(specimen.fails(format!(
-                            "`{}` = {} and {} give the same fluxes, others between do not: angles \
-                             come in degrees",
-                            p.id,
-                            specimen.values[i],
-                            specimen.values[i] + by
-                        )));
-                    }
+                n += 1;
+                if whole < ITERATED && part > 1e3 * ITERATED {
+                    return Err(specimen.fails(format_args!(
+                        "`{}` = {} and {} give the same fluxes, others between do not: angles \
+                         come in degrees",
+                        p.id,
+                        specimen.values[i],
+                        specimen.values[i] + by
+                    )));
                 }
             }
         }
+        Ok(n)
+    })?;
+    counted(n, "pairs of angles", "no parameter is an angle")
+}
+
+/// The largest difference that another value of a parameter makes; nothing where it is refused.
+fn effect(specimen: &Specimen, steps: &[Step], i: usize, by: f64) -> Result<Option<f64>, Verdict> {
+    let mut values = specimen.values.clone();
+    values[i] += by;
+    let bounds = specimen.law.description().parameters[i].bounds;
+    if !bounds.contain(values[i]) {
+        return Ok(None);
     }
-    if n == 0 {
-        return Err(skipped("no parameter is an angle"));
-    }
-    Ok(format!("{n} pairs of angles"))
+    let Some(probe) = specimen.with_values(&values)? else {
+        return Ok(None);
+    };
+    let ends = probe.integrate(&starts(steps), &specimen.form(raw::PILUM_REQ_FLUX))?;
+    let differences = steps.iter().zip(&ends.points).map(|(step, end)| {
+        if is_success(end.status) {
+            apart(&step.end.flux, &end.flux) / flux_scale(step)
+        } else {
+            f64::INFINITY
+        }
+    });
+    Ok(Some(differences.fold(0.0, f64::max)))
 }
 
 pub(super) fn plastic_work_is_not_negative(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "work");
-    let (mut n_steps, mut least) = (0, -1e-6);
+    let mut least = -1e-6;
     let mut worst = None;
-    for specimen in subject.specimens_by_default(4, &mut random)? {
-        let steps = specimen.paths(36, &mut random)?.steps;
-        let starts: Vec<PointStart> = steps.iter().map(|step| step.start.clone()).collect();
-        let elastic = specimen.call(&starts, ELASTIC)?.points;
+    let n = subject.each_by_default("work", 4, |specimen, random| {
+        let steps = specimen.paths(36, random)?.steps;
+        let elastic = specimen.call(&starts(&steps), ELASTIC)?.points;
         let Some(first) = elastic.first() else {
-            continue;
+            return Ok(0);
         };
         // What creeps back gives work that was stored.
-        if depends_on_time(&specimen, &steps)? {
-            continue;
+        if specimen.depends_on_time(&steps)? {
+            return Ok(0);
         }
-        let constant = elastic.iter().all(|end| {
-            let pairs = end.tangent.iter().zip(&first.tangent);
-            pairs
-                .into_iter()
-                .all(|(a, b)| (a - b).abs() <= ROUND_OFF * largest(&first.tangent))
-        });
+        let is_constant = elastic
+            .iter()
+            .all(|end| apart(&end.tangent, &first.tangent) <= ROUND_OFF * largest(&first.tangent));
         let n = first.flux.len();
-        let Some(compliance) = DMatrix::from_row_slice(n, n, &first.tangent).try_inverse() else {
-            continue;
+        let compliance = DMatrix::from_row_slice(n, n, &first.tangent).try_inverse();
+        let Some(compliance) = compliance.filter(|_| is_constant) else {
+            return Ok(0);
         };
-        if !constant {
-            continue;
-        }
         for step in &steps {
             let flux = DVector::from_row_slice(&step.end.flux);
             let change = &flux - DVector::from_row_slice(&step.start.flux0);
@@ -199,20 +185,17 @@ pub(super) fn plastic_work_is_not_negative(subject: &Subject) -> Found {
             let relative = work / (flux_scale(step) * largest(moved.as_slice()));
             if relative < least {
                 least = relative;
-                let verdict = Verdict::Warning(format!(
+                let why = format!(
                     "the plastic work is negative, {relative:.1e} of the work in play: {}, at {}",
                     specimen.name(),
                     specimen.at(&step.start)
-                ));
-                worst = Some(specimen.recorded(&step.start, verdict));
+                );
+                worst = Some(specimen.recorded(&step.start, warned(why)));
             }
-            n_steps += 1;
         }
-    }
-    if n_steps == 0 {
-        return Err(skipped(
-            "no law that is independent of time has a constant elastic operator",
-        ));
-    }
-    worst.map_or(Ok(format!("{n_steps} steps")), Err)
+        Ok(steps.len())
+    })?;
+    let none = "no law that is independent of time has a constant elastic operator";
+    let found = counted(n, "steps", none)?;
+    worst.map_or(Ok(found), Err)
 }

@@ -1,111 +1,159 @@
 //! Is the consistent tangent the derivative of the update, symmetric and constant where that is declared?
 
-use super::{ELASTIC, LENGTHS, ROUND_OFF, flux_scale, increment, largest};
-use crate::check::loading_path::Step;
-use crate::check::margins;
-use crate::check::random::Random;
-use crate::check::specimen::{Specimen, is_success};
-use crate::check::{Found, Subject, Verdict, skipped};
-use abi::raw;
+use super::slope::{Entry, Slope, TANGENT, slope};
+use crate::check::loading_path::{Step, flux_scale, starts};
+use crate::check::points::{ELASTIC, ROUND_OFF, apart, increment, largest};
+use crate::check::specimen::Specimen;
+use crate::check::words::Words;
+use crate::check::{Found, Subject, Verdict, counted, skipped, warned};
 use law::Tangent;
-use law::probe::{PointEnd, PointStart};
+use law::probe::PointEnd;
 use std::collections::BTreeMap;
 
-/// Error of a tangent, relative to the largest stiffness. Differences are good to 10⁻⁶ or so.
-const TANGENT: f64 = 1e-4;
-/// Roundings of a flux that the two sides of a difference may have together, each of half a unit in the
-/// last place of the largest term. A component of a solid is a sum of six terms.
-const NOISE: f64 = 6.0;
+/// Number of compared tangents, and findings about them.
+#[derive(Default)]
+struct Tally {
+    n: usize,
+    n_kinks: usize,
+    /// For laws of the contract: inelastic ones, and a little stiffness that is left.
+    n_inelastic: usize,
+    left: Option<Verdict>,
+    /// For routines: those that are wrong, and the worst.
+    n_wrong: usize,
+    worst: Option<(f64, Verdict)>,
+}
 
-/// What differences say of a tangent.
-pub(in crate::check) enum Slope {
-    Right,
-    Kink,
-    /// Row and column where the flux does not change at all, though the tangent has a little stiffness.
-    Left(usize, usize),
-    /// An entry of the tangent, as the law has it and as differences do.
-    Wrong {
-        row: usize,
-        column: usize,
-        by_law: f64,
-        by_differences: f64,
-    },
+impl Tally {
+    /// A warning where most were at kinks.
+    fn found(&self, none: &str, details: String) -> Found {
+        if self.n == 0 {
+            Err(skipped(none))
+        } else if 2 * self.n_kinks > self.n {
+            Err(warned(format!("too few were compared: {details}")))
+        } else {
+            Ok(details)
+        }
+    }
+
+    /// Judges the tangent of a step. An error is one of a kind that no iteration pays for.
+    fn take(&mut self, law: &Specimen, step: &Step) -> Result<(), Verdict> {
+        let scale = step.stiffness.max(largest(&step.end.tangent));
+        let is_own = law.adapter().is_none();
+        self.n += 1;
+        match slope(law, step, scale)? {
+            Slope::Kink => self.n_kinks += 1,
+            Slope::Left(row, column) if is_own && self.left.is_none() => {
+                let names = law.hypothesis.components();
+                let entry = step.end.tangent[row * names.len() + column];
+                let why = format!(
+                    "row `{}`, column `{}` of the tangent is {entry:.6e}, {:.1e} of the stiffness, \
+                     where the flux does not change at all: a little stiffness left for the solver? \
+                     At {}",
+                    names[row],
+                    names[column],
+                    entry.abs() / scale,
+                    law.at(&step.start)
+                );
+                self.left = Some(law.warns_for(&step.start, why));
+            }
+            Slope::Right | Slope::Left(..) => {}
+            Slope::Wrong(entry) if is_own => {
+                let names = law.hypothesis.components();
+                let why = format!(
+                    "row `{}`, column `{}` of the tangent is {:.6e}, differences give \
+                     {:.6e}: wrong by {:.1e} of the stiffness",
+                    names[entry.row],
+                    names[entry.column],
+                    entry.by_law,
+                    entry.by_differences,
+                    entry.off(scale)
+                );
+                return Err(law.fails_at(&step.start, why));
+            }
+            Slope::Wrong(entry) => {
+                if fits(law, &transposed(step), scale)? {
+                    return Err(by_columns(law, step));
+                }
+                self.n_wrong += 1;
+                let off = entry.off(scale);
+                if self.worst.as_ref().is_none_or(|(most, _)| *most < off) {
+                    let why = of_entry(law, step, entry, off);
+                    self.worst = Some((off, law.warns_for(&step.start, why)));
+                }
+            }
+        }
+        Ok(())
+    }
 }
 
 pub(super) fn tangent_matches_differences(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "tangent");
-    let (mut n, mut n_kinks, mut n_inelastic) = (0, 0, 0);
-    let mut left = None;
-    for specimen in subject.specimens_by_default(5, &mut random)? {
-        let steps = specimen.paths(36, &mut random)?.steps;
-        let starts: Vec<PointStart> = steps.iter().map(|step| step.start.clone()).collect();
+    let mut tally = Tally::default();
+    subject.each_by_default("tangent", 5, |specimen, random| {
+        let steps = specimen.paths(36, random)?.steps;
         if specimen.formulation.tangent != Tangent::Consistent {
-            continue;
+            return Ok(0);
         }
-        let elastic = specimen.call(&starts, ELASTIC)?.points;
+        let elastic = specimen.call(&starts(&steps), ELASTIC)?.points;
         let mut kinds: BTreeMap<Vec<u8>, usize> = BTreeMap::new();
-        for (i, step) in steps.iter().enumerate() {
+        for (i, (step, elastic)) in steps.iter().zip(&elastic).enumerate() {
             // Every fifth, so that all increments of a straight piece occur, and the first ones of each kind,
             // since some, as those in which contact re-forms, are rare.
-            let seen = kinds.entry(kind(step, &elastic[i])).or_insert(0);
+            let seen = kinds.entry(kind(step, elastic)).or_insert(0);
             *seen += 1;
             if specimen.course.is_none() && i % 5 > 0 && *seen > OF_EACH_KIND {
                 continue;
             }
             let scale = step.stiffness.max(largest(&step.end.tangent));
-            let difference = elastic[i].tangent.iter().zip(&step.end.tangent);
-            n_inelastic += usize::from(
-                difference.fold(0.0, |most: f64, (a, b)| most.max((a - b).abs())) > TANGENT * scale,
-            );
-            n += 1;
-            match slope(&specimen, step, scale)? {
-                Slope::Right => {}
-                Slope::Kink => n_kinks += 1,
-                Slope::Left(row, column) => {
-                    let names = specimen.hypothesis.components();
-                    let entry = step.end.tangent[row * names.len() + column];
-                    let verdict = Verdict::Warning(format!(
-                        "{}: row `{}`, column `{}` of the tangent is {entry:.6e}, {:.1e} of the stiffness, \
-                         where the flux does not change at all: a little stiffness left for the solver? \
-                         At {}",
-                        specimen.name(),
-                        names[row],
-                        names[column],
-                        entry.abs() / scale,
-                        specimen.at(&step.start)
-                    ));
-                    left = left.or_else(|| Some(specimen.recorded(&step.start, verdict)));
-                }
-                Slope::Wrong {
-                    row,
-                    column,
-                    by_law,
-                    by_differences,
-                } => {
-                    let names = specimen.hypothesis.components();
-                    let why = format!(
-                        "row `{}`, column `{}` of the tangent is {by_law:.6e}, differences give \
-                         {by_differences:.6e}: wrong by {:.1e} of the stiffness, at {}",
-                        names[row],
-                        names[column],
-                        (by_law - by_differences).abs() / scale,
-                        specimen.at(&step.start)
-                    );
-                    return Err(specimen.fails_at(&step.start, why));
-                }
+            let is_inelastic = apart(&elastic.tangent, &step.end.tangent) > TANGENT * scale;
+            tally.n_inelastic += usize::from(is_inelastic);
+            tally.take(specimen, step)?;
+        }
+        Ok(0)
+    })?;
+    let Tally {
+        n,
+        n_inelastic,
+        n_kinks,
+        ..
+    } = tally;
+    let details = format!("{n} tangents, {n_inelastic} of them inelastic, {n_kinks} at kinks");
+    let found = tally.found("no law declares a consistent tangent", details)?;
+    tally.left.map_or(Ok(found), Err)
+}
+
+/// Steps of a routine whose tangents are compared with differences, one in this many.
+const COMPARED: usize = 3;
+
+pub(in crate::check) fn ddsdde_matches_differences(subject: &Subject) -> Found {
+    let mut tally = Tally::default();
+    subject.each_walk("ddsdde", |routine, steps, _| {
+        for step in steps.iter().step_by(COMPARED) {
+            let scale = step.stiffness.max(largest(&step.end.tangent));
+            if routine.formulation.symmetric {
+                is_symmetric(routine, step, scale)?;
+            }
+            if routine.formulation.tangent == Tangent::Consistent {
+                tally.take(routine, step)?;
+            } else if fits(routine, &transposed(step), scale)? && !fits(routine, step, scale)? {
+                // One that is near the derivative may be off, but not by rows for columns.
+                return Err(by_columns(routine, step));
             }
         }
+        Ok(0)
+    })?;
+    let (n, n_kinks, n_wrong) = (tally.n, tally.n_kinks, tally.n_wrong);
+    if let Some((_, mut worst)) = tally.worst.take() {
+        worst.why = format!("{n_wrong} of {n} increments: {}", worst.why);
+        return Err(worst);
     }
-    if n == 0 {
-        return Err(skipped("no law declares a consistent tangent"));
-    }
-    let details = format!("{n} tangents, {n_inelastic} of them inelastic, {n_kinks} at kinks");
-    if 2 * n_kinks > n {
-        return Err(Verdict::Warning(format!(
-            "too few were compared: {details}"
-        )));
-    }
-    left.map_or(Ok(details), Err)
+    let details = format!("{n} increments, {n_kinks} at kinks");
+    tally.found("the stiffness is said to be approximate", details)
+}
+
+/// Whether the tangent of a step is the derivative.
+fn fits(routine: &Specimen, step: &Step, scale: f64) -> Result<bool, Verdict> {
+    let slope = slope(routine, step, scale)?;
+    Ok(matches!(slope, Slope::Right | Slope::Left(..)))
 }
 
 /// Steps of each kind that are compared at least.
@@ -133,188 +181,178 @@ fn kind(step: &Step, elastic: &PointEnd) -> Vec<u8> {
     entries.chain(states).collect()
 }
 
-/// Compares the tangent of a step with differences of three lengths, two of which have to agree with
-/// each other where it is wrong.
-pub(in crate::check) fn slope(
-    specimen: &Specimen,
-    step: &Step,
-    scale: f64,
-) -> Result<Slope, Verdict> {
-    let n = step.start.gradient1.len();
-    let size = largest(&increment(&step.start));
-    let columns: Vec<usize> = (0..n).filter(|&c| specimen.is_free(c)).collect();
-    let mut moved = Vec::new();
-    for length in LENGTHS {
-        for &c in &columns {
-            for sign in [1.0, -1.0] {
-                let mut point = step.start.clone();
-                point.gradient1[c] += sign * length * size;
-                moved.push(point);
-            }
-        }
+/// Whether the stiffness is symmetric, as it is reported to be.
+fn is_symmetric(routine: &Specimen, step: &Step, scale: f64) -> Result<(), Verdict> {
+    let n = routine.probe.n_components();
+    let entry = |i: usize, j: usize| step.end.tangent[i * n + j];
+    let pairs = (0..n * n).map(|k| (k / n, k % n));
+    let most = pairs.map(|(i, j)| (entry(i, j) - entry(j, i)).abs());
+    let most = most.fold(0.0, f64::max);
+    if most <= ROUND_OFF * scale {
+        return Ok(());
     }
-    let ends = specimen.call(&moved, raw::PILUM_REQ_FLUX)?.points;
-    let mut verdict = Slope::Kink;
-    let mut left = None;
-    let (mut off, mut right) = (0.0, f64::INFINITY);
-    // The differences of the length before, entry by entry.
-    let mut longer: Vec<f64> = Vec::new();
-    for (l, _) in LENGTHS.iter().enumerate() {
-        // What rounding of the fluxes makes of differences this short: where that is more than is allowed, they
-        // say nothing.
-        let noise = NOISE * f64::EPSILON * flux_scale(step) / (LENGTHS[l] * size);
-        if noise > TANGENT * scale {
-            break;
-        }
-        let allowed = TANGENT * scale + noise;
-        let mut slopes = vec![f64::NAN; n * n];
-        let (mut error, mut disagreement, mut worst) = (0.0_f64, 0.0_f64, Slope::Right);
-        for (k, &c) in columns.iter().enumerate() {
-            let first = 2 * (l * columns.len() + k);
-            let [plus, minus] = [first, first + 1].map(|i| &ends[i]);
-            if !(is_success(plus.status) && is_success(minus.status)) {
-                // The limit of what the law can follow is a kink as well.
-                disagreement = f64::INFINITY;
-                continue;
-            }
-            // What was really added, after rounding.
-            let [up, down] =
-                [first, first + 1].map(|i| moved[i].gradient1[c] - step.start.gradient1[c]);
-            for row in 0..n {
-                let [above, here, below] =
-                    [&plus.flux, &step.end.flux, &minus.flux].map(|f| f[row]);
-                let by_differences = (above - below) / (up - down);
-                slopes[row * n + c] = by_differences;
-                let by_law = step.end.tangent[row * n + c];
-                let wrong = (by_differences - by_law).abs();
-                let forward = (above - here) / up;
-                let backward = (here - below) / -down;
-                let stays = [above, below].iter().all(|f| f.to_bits() == here.to_bits());
-                // Of a length at which this much stiffness would show.
-                let shows = by_law.abs() * up > 1e3 * f64::EPSILON * here.abs();
-                if l == 0 && stays && shows && by_law.abs() > ROUND_OFF * scale {
-                    left = left.or(Some((row, c)));
-                }
-                disagreement = disagreement.max((forward - backward).abs());
-                if wrong > error {
-                    error = wrong;
-                    worst = Slope::Wrong {
-                        row,
-                        column: c,
-                        by_law,
-                        by_differences,
-                    };
-                }
-            }
-        }
-        if disagreement.is_finite() && error <= allowed {
-            // The nearest of the lengths: the others have an error of their own.
-            right = right.min(error / allowed);
-        }
-        if right.is_finite() {
-            continue;
-        }
-        // Between two kinks, sides agree with each other, but the shorter the length the steeper.
-        if let Slope::Wrong { row, column, .. } = worst
-            && let Some(before) = longer.get(row * n + column)
-            && disagreement <= 0.1 * error
-        {
-            let slope = slopes[row * n + column].abs();
-            let is_steeper = slope > 10.0 * before.abs() && slope > 1e-2 * TANGENT * scale;
-            let agrees = (before - slopes[row * n + column]).abs() <= 0.1 * error;
-            if agrees && !is_steeper {
-                verdict = worst;
-                off = error / allowed;
-            }
-        }
-        longer = slopes;
+    let why = format!(
+        "{}, and {} is off by {:.1e} of the stiffness, at {}",
+        if routine.has_sidecar() {
+            "`symmetric = true`"
+        } else {
+            "it is said to be symmetric"
+        },
+        routine.words().stiffness,
+        most / scale,
+        routine.at(&step.start)
+    );
+    Err(routine.fails_for(&step.start, why))
+}
+
+/// The step with rows of its stiffness for columns.
+fn transposed(step: &Step) -> Step {
+    let n = step.end.flux.len();
+    let mut other = step.clone();
+    other.end.tangent = (0..n * n)
+        .map(|k| step.end.tangent[(k % n) * n + k / n])
+        .collect();
+    other
+}
+
+/// The failure of a stiffness that stands row by row where columns are read, or the other way round.
+fn by_columns(routine: &Specimen, step: &Step) -> Verdict {
+    let words = routine.words();
+    let why = format!(
+        "the transpose of {0} is the derivative of {1}, {0} is not: its transpose fits: `tangent_order` in {2}, \
+         at {3}",
+        words.stiffness,
+        words.stress,
+        if routine.has_sidecar() {
+            "the sidecar"
+        } else {
+            "the driver and the case"
+        },
+        routine.at(&step.start)
+    );
+    routine.fails_for(&step.start, why)
+}
+
+/// An entry that is wrong by so much of the stiffness, in words.
+fn of_entry(routine: &Specimen, step: &Step, entry: Entry, off: f64) -> String {
+    let names = routine.hypothesis.components();
+    format!(
+        "{}({}, {}), {} by {}, is {:.6e}, differences give {:.6e}: wrong by {off:.1e} of \
+         the stiffness, the most of all, which a run pays for with iterations. {}{}At {}",
+        routine.words().stiffness,
+        entry.row + 1,
+        entry.column + 1,
+        names[entry.row],
+        names[entry.column],
+        entry.by_law,
+        entry.by_differences,
+        cause(
+            routine,
+            step,
+            (entry.row, entry.column),
+            entry.by_differences / entry.by_law
+        ),
+        routine.advice(
+            "An elastic or otherwise approximate one is declared by `tangent = \"approximate\"` in the \
+             sidecar. "
+        ),
+        routine.at(&step.start)
+    )
+}
+
+/// How near a ratio is to 2 or 1/2 where shear strains are confused.
+const FACTOR: f64 = 1e-3;
+
+/// What a wrong entry looks like, where it looks like something.
+fn cause(routine: &Specimen, step: &Step, (row, column): (usize, usize), ratio: f64) -> String {
+    let Words {
+        stress,
+        strain,
+        stiffness,
+        ..
+    } = routine.words();
+    let (from, to) = (step.start.flux0[row], step.end.flux[row]);
+    if ratio == 0.0 && from.to_bits() == to.to_bits() {
+        return format!(
+            "{stress}({}) stays {to:e} in this increment: is it returned? ",
+            row + 1
+        );
     }
-    if right.is_finite() {
-        margins::note("tangent", right);
-        return Ok(left.map_or(Slope::Right, |(row, c)| Slope::Left(row, c)));
+    let is_shear = |c: usize| !routine.hypothesis.is_interface() && c >= routine.n_normal();
+    if !(is_shear(row) && is_shear(column)) {
+        return String::new();
     }
-    margins::note("tangent", off);
-    Ok(verdict)
+    let times = if (ratio - 2.0).abs() < FACTOR {
+        "twice"
+    } else if (ratio - 0.5).abs() < FACTOR {
+        "half of"
+    } else {
+        return String::new();
+    };
+    format!(
+        "{stress} changes by {times} what {stiffness} says: shear components of {strain} are γ = 2ε, with G in \
+         {stiffness} and {stress} += G γ. "
+    )
 }
 
 pub(super) fn tangent_symmetry_as_declared(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "symmetry");
-    let mut n_tangents = 0;
-    for specimen in subject.specimens_by_default(4, &mut random)? {
+    let n = subject.each_by_default("symmetry", 4, |specimen, random| {
         if !specimen.formulation.symmetric {
-            continue;
+            return Ok(0);
         }
-        for step in specimen.paths(36, &mut random)?.steps {
+        let steps = specimen.paths(36, random)?.steps;
+        for step in &steps {
             let k = &step.end.tangent;
             let n = step.end.flux.len();
             let bound = ROUND_OFF * largest(k).max(step.stiffness);
-            for row in 0..n {
-                for column in 0..row {
-                    let names = specimen.hypothesis.components();
-                    let (lower, upper) = (k[row * n + column], k[column * n + row]);
-                    if (lower - upper).abs() > bound {
-                        let why = format!(
-                            "the tangent is declared symmetric, but row `{0}`, column `{1}` is \
-                             {lower:.6e}, row `{1}`, column `{0}` {upper:.6e}, at {2}",
-                            names[row],
-                            names[column],
-                            specimen.at(&step.start)
-                        );
-                        return Err(specimen.fails_at(&step.start, why));
-                    }
-                }
-            }
-            n_tangents += 1;
-        }
-    }
-    if n_tangents == 0 {
-        return Err(skipped("no tangent is declared symmetric"));
-    }
-    Ok(format!("{n_tangents} tangents"))
-}
-
-pub(super) fn linearity_as_declared(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "linearity");
-    let mut n_steps = 0;
-    for specimen in subject.specimens_by_default(3, &mut random)? {
-        if !specimen.formulation.linear {
-            continue;
-        }
-        let steps = specimen.paths(20, &mut random)?.steps;
-        let Some(first) = steps.first() else { continue };
-        let constant = &first.end.tangent;
-        let n = first.end.flux.len();
-        for step in &steps {
-            let moved = increment(&step.start);
-            let predicted = (0..n).map(|row| {
-                let product: f64 = (0..n).map(|c| constant[row * n + c] * moved[c]).sum();
-                step.start.flux0[row] + product
-            });
-            let bound = ROUND_OFF * flux_scale(step);
-            let off = predicted
-                .zip(&step.end.flux)
-                .any(|(predicted, found)| (predicted - found).abs() > bound);
-            let changed = constant
-                .iter()
-                .zip(&step.end.tangent)
-                .any(|(a, b)| (a - b).abs() > ROUND_OFF * step.stiffness);
-            if off || changed {
+            let mut pairs = (0..n).flat_map(|row| (0..row).map(move |column| (row, column)));
+            let unlike = pairs
+                .find(|(row, column)| (k[row * n + column] - k[column * n + row]).abs() > bound);
+            if let Some((row, column)) = unlike {
+                let names = specimen.hypothesis.components();
                 let why = format!(
-                    "declared linear, but {}, at {}",
-                    if off {
-                        "the tangent does not predict the flux"
-                    } else {
-                        "the tangent changes"
-                    },
-                    specimen.at(&step.start)
+                    "the tangent is declared symmetric, but row `{0}`, column `{1}` is \
+                     {2:.6e}, row `{1}`, column `{0}` {3:.6e}",
+                    names[row],
+                    names[column],
+                    k[row * n + column],
+                    k[column * n + row]
                 );
                 return Err(specimen.fails_at(&step.start, why));
             }
-            n_steps += 1;
         }
-    }
-    if n_steps == 0 {
-        return Err(skipped("no law is declared linear"));
-    }
-    Ok(format!("{n_steps} steps"))
+        Ok(steps.len())
+    })?;
+    counted(n, "tangents", "no tangent is declared symmetric")
+}
+
+pub(super) fn linearity_as_declared(subject: &Subject) -> Found {
+    let n = subject.each_by_default("linearity", 3, |specimen, random| {
+        if !specimen.formulation.linear {
+            return Ok(0);
+        }
+        let steps = specimen.paths(20, random)?.steps;
+        for step in &steps {
+            let constant = &steps[0].end.tangent;
+            let moved = increment(&step.start);
+            let rows = constant.chunks(moved.len());
+            let predicted: Vec<f64> = rows
+                .zip(&step.start.flux0)
+                .map(|(row, flux)| {
+                    let entries = row.iter().zip(&moved);
+                    flux + entries.map(|(k, d)| k * d).sum::<f64>()
+                })
+                .collect();
+            let why = if apart(&predicted, &step.end.flux) > ROUND_OFF * flux_scale(step) {
+                "the tangent does not predict the flux"
+            } else if apart(constant, &step.end.tangent) > ROUND_OFF * step.stiffness {
+                "the tangent changes"
+            } else {
+                continue;
+            };
+            return Err(specimen.fails_at(&step.start, format_args!("declared linear, but {why}")));
+        }
+        Ok(steps.len())
+    })?;
+    counted(n, "steps", "no law is declared linear")
 }

@@ -1,47 +1,50 @@
 //! Does a result depend on what is asked for next to it, or on when it is?
 
-use super::{Called, UPDATE, compare};
+use super::{Called, compare};
 use crate::check::margins;
-use crate::check::random::Random;
-use crate::check::specimen::{Function, first_difference, is_success};
+use crate::check::points::{ELASTIC, UPDATE, first_difference, increment, is_success, largest};
+use crate::check::specimen::{BOTH, name};
 use crate::check::{Found, Subject, Verdict};
 use abi::raw;
+use law::probe::call_log::Function;
 use law::probe::{Form, PointEnd, PointStart};
 
 pub(super) fn independent_of_request(subject: &Subject) -> Found {
-    let forms: [(u32, u64); 4] = [
+    let forms = [
         (raw::PILUM_REQ_FLUX, 0),
-        (raw::PILUM_REQ_FLUX | raw::PILUM_REQ_ELASTIC, 0),
+        (ELASTIC, 0),
         (UPDATE, 1),
         (UPDATE, 1 << 40),
     ];
     let mut rounded: Option<Verdict> = None;
     for (request, first_point) in forms {
         compare(subject, "request", |called, points, _| {
+            let specimen = called.specimen;
             let form = Form {
                 first_point,
-                ..called.specimen.form(request)
+                ..specimen.form(request)
             };
             let expected = called.update(points)?;
-            let mut ends = called.specimen.ask(called.function, points, &form)?;
+            let mut ends = called.ask(points, &form)?;
+            let may_be_rounded = called.function == Function::Integrate && first_point == 0;
             for ((end, expected), point) in ends.iter_mut().zip(expected).zip(points) {
-                let last_bits = called.function == Function::Integrate && first_point == 0;
-                if let (true, Some(by)) = (last_bits, rounding(point, end, &expected)) {
-                    if by > 0.0 {
-                        let verdict = Verdict::Warning(format!(
-                            "{}: without the consistent tangent the flux {:?} is {:?}, {by:.0} units of \
+                let Some(by) = rounding(point, end, &expected).filter(|_| may_be_rounded) else {
+                    end.tangent = expected.tangent;
+                    continue;
+                };
+                if by > 0.0 {
+                    rounded.get_or_insert_with(|| {
+                        let why = format!(
+                            "without the consistent tangent the flux {:?} is {:?}, {by:.0} units of \
                              rounding apart: are there two versions of the update? At {}",
-                            called.specimen.name(),
                             expected.flux,
                             end.flux,
-                            called.specimen.at(point)
-                        ));
-                        rounded.get_or_insert_with(|| called.specimen.recorded(point, verdict));
-                    }
-                    *end = expected;
-                } else {
-                    end.tangent = expected.tangent;
+                            specimen.at(point)
+                        );
+                        specimen.warns_for(point, why)
+                    });
                 }
+                *end = expected;
             }
             Ok(ends)
         })?;
@@ -58,9 +61,7 @@ fn rounding(start: &PointStart, a: &PointEnd, b: &PointEnd) -> Option<f64> {
     if !(is_success(a.status) && a.status == b.status) {
         return None;
     }
-    let largest = |values: &[f64]| values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-    let moved = start.gradient1.iter().zip(&start.gradient0);
-    let moved = moved.fold(0.0_f64, |most, (end, begin)| most.max((end - begin).abs()));
+    let moved = largest(&increment(start));
     // `b` has the tangent.
     let flux = largest(&start.flux0)
         .max(largest(&b.flux))
@@ -79,7 +80,7 @@ fn rounding(start: &PointStart, a: &PointEnd, b: &PointEnd) -> Option<f64> {
         apart(*a, *b, scale)
     });
     let all: Vec<f64> = fluxes.chain(states).collect();
-    let most = all.iter().copied().fold(0.0, f64::max);
+    let most = largest(&all);
     margins::note("rounding", most / ROUNDINGS);
     (all.iter().all(|by| *by <= ROUNDINGS)).then_some(most)
 }
@@ -89,51 +90,50 @@ const TIMES: [f64; 2] = [0.125, 1e5];
 const LENGTHS: [f64; 3] = [0.0, 1e-3, 1e4];
 
 pub(super) fn independent_of_time(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "time");
-    let mut n = 0;
-    for specimen in &subject.specimens(3, &mut random)? {
-        let points = specimen.points(48, &mut random)?;
+    let n = subject.each("time", 3, |specimen, random| {
+        let points = specimen.points(48, random)?;
         let parameters = specimen.law.description().parameters.iter();
         let variables = specimen.formulation.internal_variables.iter();
-        let mut units = parameters
-            .map(|p| &p.unit)
-            .chain(variables.map(|v| &v.unit));
+        let units = parameters.map(|p| &p.unit);
+        let mut units = units.chain(variables.map(|v| &v.unit));
         let may_depend = units.any(|unit| has_time(unit));
-        for function in Function::BOTH {
+        let ordinary = specimen.form(UPDATE);
+        let began = TIMES.map(|time| (format!("at time {time}"), Form { time, ..ordinary }));
+        let lengths = LENGTHS.map(|time_increment| {
+            let form = Form {
+                time_increment,
+                ..ordinary
+            };
+            (format!("over a time of {time_increment}"), form)
+        });
+        let lengths = lengths.into_iter().filter(|_| !may_depend);
+        let forms: Vec<(String, Form)> = began.into_iter().chain(lengths).collect();
+        let mut n = 0;
+        for function in BOTH {
             let called = Called { specimen, function };
-            let ordinary = specimen.form(UPDATE);
             let expected = called.update(&points)?;
-            let began = TIMES.map(|time| (format!("at time {time}"), Form { time, ..ordinary }));
-            let lengths = LENGTHS.map(|time_increment| {
-                let form = Form {
-                    time_increment,
-                    ..ordinary
-                };
-                (format!("over a time of {time_increment}"), form)
-            });
-            let lengths = lengths.into_iter().filter(|_| !may_depend);
-            for (when, form) in began.into_iter().chain(lengths) {
-                let found = specimen.ask(function, &points, &form)?;
+            for (when, form) in &forms {
+                let found = called.ask(&points, form)?;
                 n += found.len();
                 let Some(i) = first_difference(&expected, &found) else {
                     continue;
                 };
                 let why = format!(
-                    "{}: `{}` gives flux {:?} and internal variables {:?}, {when} {:?} and {:?}, \
+                    "`{}` gives flux {:?} and internal variables {:?}, {when} {:?} and {:?}, \
                      at {}; a law that depends on how long an increment takes has a parameter with \
                      a unit of time",
-                    specimen.name(),
-                    function.name(),
+                    name(function),
                     expected[i].flux,
                     expected[i].state,
                     found[i].flux,
                     found[i].state,
                     specimen.at(&points[i])
                 );
-                return Err(specimen.recorded(&points[i], Verdict::Warning(why)));
+                return Err(specimen.warns_for(&points[i], why));
             }
         }
-    }
+        Ok(n)
+    })?;
     Ok(format!("{n} points"))
 }
 

@@ -1,8 +1,9 @@
 //! Does a result depend on other instances, or on earlier calls?
 
-use super::{Called, UPDATE, compare};
+use super::{Called, compare};
+use crate::check::points::{ELASTIC, UPDATE, first_difference};
 use crate::check::random::Random;
-use crate::check::specimen::{Function, create_form, first_difference};
+use crate::check::specimen::{BOTH, asked, name};
 use crate::check::{Found, Subject, Verdict};
 use abi::raw;
 use law::probe::{Form, PointEnd, PointStart, Probe};
@@ -12,34 +13,16 @@ pub(super) fn instances_are_independent(subject: &Subject) -> Found {
     compare(subject, "instances", |called, points, _| {
         let specimen = called.specimen;
         for other in &others {
-            let form = create_form(&other.formulation, other.hypothesis, &other.values);
-            let created = other.law.probe(&form)?;
+            let created = other.with_values(&other.values)?;
             if other.hypothesis == specimen.hypothesis
                 && other.law.description().id == specimen.law.description().id
-                && let Some(probe) = &created.probe
+                && let Some(probe) = &created
             {
-                on(probe, called.function, points, UPDATE)?;
+                asked(probe, called.function, points, &Form::of(UPDATE))?;
             }
         }
         called.update(points)
     })
-}
-
-/// What another instance makes of the points.
-fn on(
-    probe: &Probe,
-    function: Function,
-    points: &[PointStart],
-    request: u32,
-) -> Result<Vec<PointEnd>, Verdict> {
-    let answer = match function {
-        Function::Integrate => Some(probe.integrate(points, &Form::of(request))?),
-        Function::InitState => {
-            let fluxes: Vec<Vec<f64>> = points.iter().map(|point| point.flux0.clone()).collect();
-            probe.init_state(&fluxes, &Form::of(0))?
-        }
-    };
-    Ok(answer.map_or(Vec::new(), |answer| answer.points))
 }
 
 /// A change of one input of a call; other inputs stay.
@@ -72,32 +55,24 @@ const PARTS: [f64; 2] = [0.5, 1e-9];
 
 pub(super) fn independent_of_earlier_calls(subject: &Subject) -> Found {
     const N: usize = 8;
-    let mut random = Random::new(subject.seed, "earlier calls");
-    let mut n = 0;
-    for specimen in &subject.specimens(2, &mut random)? {
-        let points = specimen.points(2 * N, &mut random)?;
+    let n = subject.each("earlier calls", 2, |specimen, random| {
+        let points = specimen.points(2 * N, random)?;
+        let mut n = 0;
         for (i, point) in points.iter().enumerate().take(N) {
             let unlike = &points[(i + points.len() / 2) % points.len()];
-            for function in Function::BOTH {
-                n += after_alike(&Called { specimen, function }, point, unlike)?;
-                after_other_instances(subject, &Called { specimen, function }, point, unlike)?;
+            for function in BOTH {
+                let called = Called { specimen, function };
+                n += after_alike(called, point, unlike)?;
+                after_other_instances(subject, called, point, unlike)?;
             }
         }
-    }
+        Ok(n)
+    })?;
     Ok(format!("{n} calls"))
 }
 
-/// Compares calls after an unlike one with the same after one that differs in a single thing.
-fn after_alike(
-    called: &Called<'_>,
-    point: &PointStart,
-    unlike: &PointStart,
-) -> Result<usize, Verdict> {
-    let Called { specimen, function } = called;
-    let one = |start: &PointStart, form: &Form| {
-        specimen.ask(*function, std::slice::from_ref(start), form)
-    };
-    let form = specimen.form(UPDATE);
+/// Calls that differ from one for this point in a single thing, in words.
+fn alike(point: &PointStart, form: Form) -> Vec<(String, PointStart, Form)> {
     let mut calls = Vec::new();
     for part in PARTS {
         for (what, change) in CHANGES {
@@ -111,13 +86,23 @@ fn after_alike(
         };
         calls.push(("the time increment".to_owned(), point.clone(), slower));
     }
-    for request in [
-        raw::PILUM_REQ_FLUX,
-        raw::PILUM_REQ_FLUX | raw::PILUM_REQ_ELASTIC,
-    ] {
+    for request in [raw::PILUM_REQ_FLUX, ELASTIC] {
         let other = Form { request, ..form };
         calls.push(("the request".to_owned(), point.clone(), other));
     }
+    calls
+}
+
+/// Compares calls after an unlike one with the same after one that differs in a single thing.
+fn after_alike(
+    called: Called<'_>,
+    point: &PointStart,
+    unlike: &PointStart,
+) -> Result<usize, Verdict> {
+    let one = |start: &PointStart, form: &Form| called.ask(std::slice::from_ref(start), form);
+    let Called { specimen, function } = called;
+    let form = specimen.form(UPDATE);
+    let calls = alike(point, form);
     for (what, start, form_of_it) in &calls {
         one(unlike, &form)?;
         let expected = one(start, form_of_it)?;
@@ -128,24 +113,16 @@ fn after_alike(
             let why = format!(
                 "`{}` gives another result after a call that differs in {what} alone: \
                  flux {:?} and internal variables {:?}, else {:?} and {:?}, at {}",
-                function.name(),
+                name(function),
                 found[0].flux,
                 found[0].state,
                 expected[0].flux,
                 expected[0].state,
                 specimen.at(start)
             );
-            return Err(if *function == Function::InitState {
-                let before = [point.flux0.clone()];
-                specimen.fails_to_start(
-                    std::slice::from_ref(&start.flux0),
-                    form_of_it,
-                    &before,
-                    why,
-                )
-            } else {
-                specimen.fails_at(start, why)
-            });
+            let starts = std::slice::from_ref(start);
+            let before = std::slice::from_ref(point);
+            return Err(specimen.fails_in(function, (starts, 0), (form_of_it, before), why));
         }
     }
     Ok(calls.len())
@@ -155,19 +132,14 @@ fn after_alike(
 /// one stood.
 fn after_other_instances(
     subject: &Subject,
-    called: &Called<'_>,
+    Called { specimen, function }: Called<'_>,
     point: &PointStart,
     unlike: &PointStart,
 ) -> Result<(), Verdict> {
-    let Called { specimen, function } = called;
-    let one = |probe: &Probe, start: &PointStart| {
-        on(probe, *function, std::slice::from_ref(start), UPDATE)
+    let form = Form::of(UPDATE);
+    let one = |probe: &Probe, start: &PointStart| -> Result<Vec<PointEnd>, Verdict> {
+        asked(probe, function, std::slice::from_ref(start), &form)
     };
-    let create = |values: &[f64]| {
-        let form = create_form(&specimen.formulation, specimen.hypothesis, values);
-        Ok::<_, Verdict>(specimen.law.probe(&form)?.probe)
-    };
-    // One whose parameters all differ makes a law forget what it kept of the others.
     let parameters = specimen.law.description().parameters.iter().enumerate();
     let varied: Vec<usize> = parameters
         .filter(|(i, p)| {
@@ -176,18 +148,18 @@ fn after_other_instances(
         })
         .map(|(i, _)| i)
         .collect();
-    let with = |some: &[usize]| -> Vec<f64> {
+    let varying = |some: &[usize]| {
         let mut values = specimen.values.clone();
         for &i in some {
             values[i] *= 1.0 - 1e-3;
         }
-        values
+        specimen.with_values(&values)
     };
-    let unlike_all = create(&with(&varied))?;
+    // One whose parameters all differ makes a law forget what it kept of the others.
+    let unlike_all = varying(&varied)?;
     let forget = || one(unlike_all.as_ref().unwrap_or(&specimen.probe), unlike);
     for &i in &varied {
-        let parameter = &specimen.law.description().parameters[i];
-        let Some(other) = create(&with(&[i]))? else {
+        let Some(other) = varying(&[i])? else {
             continue;
         };
         forget()?;
@@ -198,14 +170,14 @@ fn after_other_instances(
         // Where the first one stood.
         forget()?;
         one(&other, point)?;
-        let again = in_place_of(other, || create(&specimen.values))?;
+        let again = in_place_of(other, || specimen.with_values(&specimen.values))?;
         let there = again.map(|again| one(&again, point)).transpose()?;
         forget()?;
         let own = one(&specimen.probe, point)?;
         let what = if first_difference(&expected, &found).is_some() {
             format!(
                 "after the same call of an instance that differs in `{}` alone",
-                parameter.id
+                specimen.law.description().parameters[i].id
             )
         } else if there.is_some_and(|there| first_difference(&own, &there).is_some()) {
             "in an instance that stands where another one stood".to_owned()
@@ -214,15 +186,11 @@ fn after_other_instances(
         };
         let why = format!(
             "`{}` gives another result {what}, at {}",
-            function.name(),
+            name(function),
             specimen.at(point)
         );
-        return Err(if *function == Function::InitState {
-            let fluxes = std::slice::from_ref(&point.flux0);
-            specimen.fails_to_start(fluxes, &specimen.form(0), &[], why)
-        } else {
-            specimen.fails_at(point, why)
-        });
+        let starts = std::slice::from_ref(point);
+        return Err(specimen.fails_in(function, (starts, 0), (&specimen.form(0), &[]), why));
     }
     Ok(())
 }

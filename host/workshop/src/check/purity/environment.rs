@@ -1,8 +1,7 @@
 //! Does a law leave numbers and the process alone?
 
-use super::UPDATE;
-use crate::check::random::Random;
-use crate::check::{Found, Subject, Verdict, failed};
+use crate::check::points::UPDATE;
+use crate::check::{Found, Subject, Verdict, failed, warned};
 use law::probe::process;
 use std::ffi::OsString;
 use std::hint::black_box;
@@ -114,18 +113,18 @@ pub(super) fn environment_is_left_alone(subject: &Subject) -> Found {
     }
     match law::process_state::remarks().pop() {
         None => Ok(String::new()),
-        Some(remark) => Err(Verdict::Warning(remark)),
+        Some(remark) => Err(warned(remark)),
     }
 }
 
 /// Uses all functions, with failures too.
-pub(super) fn drive(subject: &Subject) -> Found {
-    let mut random = Random::new(subject.seed, "drive");
-    for specimen in subject.specimens(2, &mut random)? {
-        specimen.paths(20, &mut random)?;
-        let mut points = specimen.points(3, &mut random)?;
+pub(super) fn drive(subject: &Subject) -> Result<(), Verdict> {
+    subject.each("drive", 2, |specimen, random| {
+        specimen.paths(20, random)?;
+        let mut points = specimen.points(3, random)?;
         points[0].gradient1[0] = f64::NAN;
         specimen.call(&points, UPDATE)?;
-    }
-    Ok(String::new())
+        Ok(0)
+    })?;
+    Ok(())
 }

@@ -3,8 +3,8 @@
 
 use super::change;
 use crate::check::Verdict;
-use crate::check::mathematics::UPDATE;
-use crate::check::specimen::{Specimen, first_difference};
+use crate::check::points::{UPDATE, first_difference};
+use crate::check::specimen::Specimen;
 use law::probe::{PointEnd, PointStart};
 
 /// What is there in turn: comparisons with zero and one come out otherwise.

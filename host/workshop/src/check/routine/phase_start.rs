@@ -1,12 +1,12 @@
 //! Does a routine go on where a phase begins? There KINC and the time of the step start again, and internal
 //! variables do not.
 
-use super::messages::{Words, advice, has_sidecar, is_mfront};
-use super::{bits, differ, each};
-use crate::check::loading_path::{Step, sum};
-use crate::check::mathematics::{ITERATED, flux_scale, increment};
-use crate::check::specimen::{Specimen, is_success};
-use crate::check::{Found, Subject, Verdict, skipped};
+use crate::check::loading_path::{Step, flux_scale};
+use crate::check::points::{ITERATED, apart, bits, increment, is_success, moved_by};
+use crate::check::specimen::Specimen;
+use crate::check::verdict::Outcome;
+use crate::check::words::Words;
+use crate::check::{Found, Subject, Verdict, counted};
 use abi::raw;
 use law::Moment;
 use law::probe::{Form, PointEnd, PointStart};
@@ -39,7 +39,7 @@ fn later(routine: &Specimen) -> (f64, Moment) {
 /// Arguments that must not change a routine that has begun.
 fn others(routine: &Specimen) -> Vec<Other> {
     let (time, moment) = later(routine);
-    let counter = Words::of(routine).increment;
+    let counter = routine.words().increment;
     let first = Moment {
         increment: 1,
         ..moment
@@ -51,7 +51,7 @@ fn others(routine: &Specimen) -> Vec<Other> {
         is_frequent: true,
         is_declared: false,
     }];
-    if !has_sidecar(routine) {
+    if !routine.has_sidecar() {
         return all;
     }
     all.push(Other {
@@ -87,12 +87,7 @@ fn next(step: &Step, stress: &[f64], state: &[f64]) -> [PointStart; 2] {
     let moved = increment(&step.start);
     [1.0, -1.0].map(|sign| {
         let by: Vec<f64> = moved.iter().map(|value| sign * value).collect();
-        PointStart {
-            gradient0: step.start.gradient1.clone(),
-            gradient1: sum(&step.start.gradient1, &by),
-            flux0: stress.to_vec(),
-            state0: state.to_vec(),
-        }
+        moved_by(&step.start.gradient1, &by, stress, state)
     })
 }
 
@@ -110,10 +105,14 @@ fn matters(
             .integrate(&next(step, &usual.flux, state), &form)
     };
     let (usual, other) = (of(&usual.state)?.points, of(&other.state)?.points);
-    Ok(usual.iter().zip(&other).any(|(a, b)| {
-        is_success(a.status) != is_success(b.status)
-            || is_success(a.status) && differ(&a.flux, &b.flux, ITERATED * flux_scale(step))
-    }))
+    let mut pairs = usual.iter().zip(&other);
+    Ok(pairs.any(|(a, b)| has_other_flux(step, a, b)))
+}
+
+/// Whether one of them fails, or their fluxes differ.
+fn has_other_flux(step: &Step, a: &PointEnd, b: &PointEnd) -> bool {
+    is_success(a.status) != is_success(b.status)
+        || is_success(a.status) && apart(&a.flux, &b.flux) > ITERATED * flux_scale(step)
 }
 
 /// What another moment changes: a failure, or a warning that others may replace; whether it changes stresses.
@@ -123,9 +122,8 @@ fn judged(
     other: &Other,
     [usual, found]: [&PointEnd; 2],
 ) -> Result<Option<(Verdict, bool)>, Verdict> {
-    let Words { stress, state, .. } = Words::of(routine);
-    let of_flux = is_success(usual.status) != is_success(found.status)
-        || differ(&usual.flux, &found.flux, ITERATED * flux_scale(step));
+    let Words { stress, state, .. } = routine.words();
+    let of_flux = has_other_flux(step, usual, found);
     let of_state = bits(&usual.state) != bits(&found.state);
     if !of_flux && !of_state {
         return Ok(None);
@@ -147,21 +145,14 @@ fn judged(
         format!("{state} {:?} becomes {:?}{then}", usual.state, found.state)
     };
     let why = format!(
-        "with {} {change}{}, at {}",
+        "with {} {change}{}",
         other.what,
-        if other.is_frequent {
-            advice(
-                routine,
-                ": every phase and segment begins so. Internal variables begin with `initial` in the sidecar; a \
-                 routine that begins by itself asks for KSTEP and KINC, or for TIME(2)",
-            )
+        routine.advice(if other.is_frequent {
+            ": every phase and segment begins so. Internal variables begin with `initial` in the sidecar; a \
+             routine that begins by itself asks for KSTEP and KINC, or for TIME(2)"
         } else {
-            advice(
-                routine,
-                ": the first phase of a case and the first segment of a driver have it, all others do not",
-            )
-        },
-        routine.at(&step.start)
+            ": the first phase of a case and the first segment of a driver have it, all others do not"
+        })
     );
     let verdict = if counts && other.is_frequent && !other.is_declared {
         routine.fails_at(&step.start, why)
@@ -177,7 +168,7 @@ const ALONE: usize = 4;
 /// Whether the first call after another moment is the same as when it is repeated: the two differ by what is
 /// kept in SAVE. The last increments, with the largest changes, each alone.
 fn remembers(routine: &Specimen, steps: &[&Step], other: &Other) -> Result<(), Verdict> {
-    let Words { stress, state, .. } = Words::of(routine);
+    let Words { stress, state, .. } = routine.words();
     for step in steps.iter().rev().take(ALONE) {
         let call = |at: (f64, Moment)| {
             let start = std::slice::from_ref(&step.start);
@@ -197,9 +188,8 @@ fn remembers(routine: &Specimen, steps: &[&Step], other: &Other) -> Result<(), V
                 &step.start,
                 format!(
                     "after a call with {} the usual one leaves {what} {first:?}, and {repeated:?} when it is \
-                     repeated: something is kept from call to call (SAVE, COMMON), at {}",
-                    other.what,
-                    routine.at(&step.start)
+                     repeated: something is kept from call to call (SAVE, COMMON)",
+                    other.what
                 ),
             ));
         }
@@ -209,8 +199,8 @@ fn remembers(routine: &Specimen, steps: &[&Step], other: &Other) -> Result<(), V
 
 pub(super) fn routine_does_not_begin_again(subject: &Subject) -> Found {
     let mut doubtful: Option<(Verdict, bool)> = None;
-    let n = each(subject, "first", |routine, steps, _| {
-        if is_mfront(routine) {
+    let n = subject.each_walk("first", |routine, steps, _| {
+        if routine.is_mfront() {
             return Ok(0);
         }
         let moved = |step: &&Step| step.start.gradient0.iter().any(|value| *value != 0.0);
@@ -228,7 +218,7 @@ pub(super) fn routine_does_not_begin_again(subject: &Subject) -> Found {
                 let Some((verdict, counts)) = judged(routine, step, &other, [usual, found])? else {
                     continue;
                 };
-                if verdict.is_failure() {
+                if verdict.outcome == Outcome::Failed {
                     return Err(verdict);
                 }
                 // The first one; of those that change stresses, if there are any.
@@ -243,10 +233,6 @@ pub(super) fn routine_does_not_begin_again(subject: &Subject) -> Found {
     if let Some((verdict, _)) = doubtful {
         return Err(verdict);
     }
-    if n == 0 {
-        return Err(skipped(
-            "it is not told which increment it is, or no increment follows another one",
-        ));
-    }
-    Ok(format!("{n} increments"))
+    let none = "it is not told which increment it is, or no increment follows another one";
+    counted(n, "increments", none)
 }

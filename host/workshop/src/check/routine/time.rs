@@ -1,13 +1,11 @@
 //! Does the time matter to a routine where that is reported, and nowhere else?
 
-use super::messages::{Words, advice};
-use super::{bits, differ, each, starts};
-use crate::check::loading_path::{Step, sum};
-use crate::check::mathematics::{ITERATED, flux_scale, increment};
-use crate::check::specimen::{Specimen, is_success};
-use crate::check::{Found, Subject, Verdict, skipped};
+use crate::check::loading_path::{Step, flux_scale, starts};
+use crate::check::points::{ITERATED, apart, bits, increment, is_success, moved_by};
+use crate::check::specimen::Specimen;
+use crate::check::{Found, Subject, Verdict, skipped, warned};
 use abi::raw;
-use law::adapter::Adapter;
+use law::foreign::Adapter;
 use law::probe::{Form, PointEnd, PointStart};
 
 /// What time increments differ by, to see whether they matter.
@@ -25,8 +23,8 @@ pub(super) fn time_as_declared(subject: &Subject) -> Found {
         ));
     }
     let (mut declared, mut seen) = (false, false);
-    let n = each(subject, "time", |routine, steps, _| {
-        let words = Words::of(routine);
+    let n = subject.each_walk("time", |routine, steps, _| {
+        let words = routine.words();
         let is_declared = routine.formulation.time_dependent;
         declared |= is_declared;
         let starts = starts(steps);
@@ -41,35 +39,14 @@ pub(super) fn time_as_declared(subject: &Subject) -> Found {
             for ((step, end), carried) in steps.iter().zip(ends).zip(carried) {
                 // What begins at TIME(2) = 0 does not at another one.
                 let begins = step.start.gradient0.iter().all(|value| *value == 0.0);
-                let of_flux = differ(&end.flux, &step.end.flux, ITERATED * flux_scale(step));
-                let depends = !(begins && what == words.time)
-                    && is_success(end.status)
-                    && (of_flux || carried);
-                seen |= depends;
-                if depends && !is_declared {
-                    let change = if of_flux {
-                        format!(
-                            "{} {:?} becomes {:?}",
-                            words.stress, step.end.flux, end.flux
-                        )
-                    } else {
-                        format!(
-                            "{} {:?} becomes {:?}, and {} of the next increment changes",
-                            words.state, step.end.state, end.state, words.stress
-                        )
-                    };
-                    return Err(routine.warns_at(
-                        &step.start,
-                        format!(
-                            "with another {what} {change}, which {} does not say{}",
-                            words.describer,
-                            advice(
-                                routine,
-                                ": say `time_dependent = true` in the sidecar, so that phases and segments \
-                                 without a `time` are told of"
-                            )
-                        ),
-                    ));
+                let of_flux = apart(&end.flux, &step.end.flux) > ITERATED * flux_scale(step);
+                let is_asked = is_success(end.status) && !(begins && what == words.time);
+                if !(is_asked && (of_flux || carried)) {
+                    continue;
+                }
+                seen = true;
+                if !is_declared {
+                    return Err(depends(routine, (step, end), what, of_flux));
                 }
             }
         }
@@ -78,9 +55,39 @@ pub(super) fn time_as_declared(subject: &Subject) -> Found {
     if declared && !seen {
         let why = "it is said to depend on the time (`time_dependent = true` in a sidecar), and neither the length of an \
                    increment (DTIME) nor its time changes anything";
-        return Err(Verdict::Warning(why.to_owned()));
+        return Err(warned(why));
     }
     Ok(format!("{n} increments"))
+}
+
+/// The warning of a step that ends otherwise with another time.
+fn depends(
+    routine: &Specimen,
+    (step, end): (&Step, &PointEnd),
+    what: &str,
+    is_of_flux: bool,
+) -> Verdict {
+    let words = routine.words();
+    let change = if is_of_flux {
+        format!(
+            "{} {:?} becomes {:?}",
+            words.stress, step.end.flux, end.flux
+        )
+    } else {
+        format!(
+            "{} {:?} becomes {:?}, and {} of the next increment changes",
+            words.state, step.end.state, end.state, words.stress
+        )
+    };
+    let why = format!(
+        "with another {what} {change}, which {} does not say{}",
+        words.describer,
+        routine.advice(
+            ": say `time_dependent = true` in the sidecar, so that phases and segments \
+             without a `time` are told of"
+        )
+    );
+    routine.warns_for(&step.start, why)
 }
 
 /// Whether other internal variables at the end of steps give another stress in a next increment like the last one.
@@ -90,15 +97,14 @@ fn carried_on(
     steps: &[Step],
     others: &[PointEnd],
 ) -> Result<Vec<bool>, Verdict> {
-    let next = |step: &Step, state: &[f64]| PointStart {
-        gradient0: step.start.gradient1.clone(),
-        gradient1: sum(&step.start.gradient1, &increment(&step.start)),
-        flux0: step.end.flux.clone(),
-        state0: state.to_vec(),
+    let next = |step: &Step, state: &[f64]| {
+        let moved = increment(&step.start);
+        moved_by(&step.start.gradient1, &moved, &step.end.flux, state)
     };
     let pairs = || steps.iter().zip(others);
-    let usual: Vec<PointStart> = pairs()
-        .map(|(step, _)| next(step, &step.end.state))
+    let usual: Vec<PointStart> = steps
+        .iter()
+        .map(|step| next(step, &step.end.state))
         .collect();
     let other: Vec<PointStart> = pairs().map(|(step, end)| next(step, &end.state)).collect();
     let usual = routine.call(&usual, raw::PILUM_REQ_FLUX)?.points;
@@ -107,7 +113,7 @@ fn carried_on(
     let counts = counts.map(|((step, end), (usual, other))| {
         let changed = bits(&step.end.state) != bits(&end.state);
         let both = is_success(usual.status) && is_success(other.status);
-        changed && both && differ(&usual.flux, &other.flux, CARRIED * flux_scale(step))
+        changed && both && apart(&usual.flux, &other.flux) > CARRIED * flux_scale(step)
     });
     Ok(counts.collect())
 }
