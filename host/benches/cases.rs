@@ -10,7 +10,7 @@ use input::Case;
 use input::case::Axis;
 use law::Operator;
 use mechanics::assembly::{Places, System};
-use mechanics::equilibrium::{Clock, Costs, Held, LinearDomain, Loads, Matrix, Newton};
+use mechanics::equilibrium::{self, Clock, Costs, Held, LinearDomain, Loads, Matrix, Newton};
 use mechanics::group::Group;
 use mechanics::{Mesh, Model, Place, Settings};
 use runs::run::{Observer, run};
@@ -248,9 +248,13 @@ fn condensed_increment(bencher: Bencher<'_, '_>) {
         let mut matrix = Matrix::default();
         let mut costs = Costs::default();
         let mut newton = Newton::new(
-            (&system, &places),
-            Some(&domain),
-            (&mut solver, &mut matrix),
+            equilibrium::Equations {
+                system: &system,
+                places: &places,
+                domain: Some(&domain),
+                solver: &mut solver,
+                matrix: &mut matrix,
+            },
             &mut chamber.model.groups,
             &chamber.settings,
             &mut costs,

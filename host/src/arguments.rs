@@ -222,6 +222,9 @@ pub(crate) enum Command {
         /// Call the law in this process, for a debugger.
         #[arg(long, conflicts_with = "isolate")]
         in_process: bool,
+        /// Write to this file how far the replay has come.
+        #[arg(long, hide = true, requires = "in_process")]
+        reached: Option<PathBuf>,
     },
     /// Write a small project for a law that builds and runs.
     NewLaw(NewLaw),

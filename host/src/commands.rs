@@ -10,7 +10,7 @@ use cases::{dry_run_cases, run_cases, write_report};
 use clap::CommandFactory;
 use input::schema::{self, FileKind};
 use input::{Case, Error};
-use law::adapter::Adapter;
+use law::foreign::Adapter;
 use law::{Opener, SearchPath, Stop, trial};
 use runs::run::Options;
 use runs::{calibration, supervision, trade_off};
@@ -199,9 +199,15 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
             print(&format!("lock in {}\n", lock.display()))
         }
         Command::Replay {
-            capsule, record, ..
+            capsule,
+            record,
+            reached,
+            ..
         } => recorded(record.as_deref(), opener, |opener| {
-            printing(|out| workshop::replay::replay(&capsule, opener, &mut |line| out.line(line)))
+            printing(|out| {
+                let say = &mut |line: &str| out.line(line);
+                workshop::replay::replay(&capsule, opener, reached.as_deref(), say)
+            })
         }),
         #[cfg(unix)]
         Command::LawWorker => Ok(law::isolate::work()?),

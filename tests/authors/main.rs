@@ -6,6 +6,7 @@
 
 mod cam_clay;
 mod compilers;
+mod decisions;
 mod foreign;
 mod guides;
 mod helpers;

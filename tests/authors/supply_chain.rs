@@ -28,7 +28,7 @@ const UNSAFE: [(&str, &str); 10] = [
         "the allocator, which ends the program with a message",
     ),
     (
-        "host/law/src/child/copy.rs",
+        "host/law/src/process/child/copy.rs",
         "the copy of the program that calls laws, made before there is a second thread",
     ),
     ("host/law/src/library.rs", "opening libraries"),

@@ -3,7 +3,7 @@
 
 use crate::{BondedPile, OPENGEOSYS, assert_close, installed, is_there, library};
 use input::Driver;
-use law::adapter::{Adapter, Foreign};
+use law::foreign::{Adapter, Foreign};
 use law::{Bounds, Opener};
 use runs::point::PointReport;
 use std::collections::BTreeMap;

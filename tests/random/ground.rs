@@ -4,9 +4,10 @@
 
 use crate::seeds::{End, hold};
 use law::{Hypothesis, SearchPath};
+use mechanics::check::Cause;
 use mechanics::mesh::{Along, Solid};
 use mechanics::problem::{
-    Analysis, AtRest, Axis, Cause, Displacement, Drainage, ElementGroup, Force, Formulation,
+    Analysis, AtRest, Axis, Displacement, Drainage, ElementGroup, Force, Formulation,
     InitialStress, Integration, Phase, Pressure, Profile, Ratio, Support, Water,
 };
 use mechanics::{Error, Material, Mesh, Problem, Simulation};

@@ -4,7 +4,7 @@ use input::case::PartInput;
 use input::{Case, Driver, Error};
 use law::capsule::{Capsule, LibraryCapsule};
 use law::inspect::{Inspection, inspect_bytes};
-use law::{LawDescription, Pins, SearchPath, adapter};
+use law::{LawDescription, Pins, SearchPath, foreign};
 use mechanics::Mesh;
 use std::path::Path;
 use text::Source;
@@ -107,7 +107,7 @@ pub(crate) fn replay(capsule: &Capsule, search: &SearchPath) -> Result<String, E
 /// # Errors
 /// At the place that does not fit.
 pub(crate) fn sidecar(source: &Source) -> Result<LawDescription, Error> {
-    Ok(adapter::sidecar(source)?)
+    Ok(foreign::sidecar(source)?)
 }
 
 /// What `pilum inspect` says of a library with these bytes.
@@ -130,5 +130,5 @@ pub(crate) fn manifest(bytes: &[u8]) -> Option<usize> {
 /// # Errors
 /// It is missing.
 pub(crate) fn behaviours(bytes: &[u8]) -> Result<Vec<LawDescription>, String> {
-    adapter::behaviours(bytes)
+    foreign::behaviours(bytes)
 }
