@@ -40,7 +40,7 @@ use fitted::fitted;
 use input::Kind;
 use input::calibration::{Calibration, StageInput, Variance};
 use law::{Opener, Stop, Stopped};
-use model::{Model, Subject};
+use model::{Model, Subject, Test};
 use parameter_block::block;
 use propagation::Errors;
 use stage::last_stage;
@@ -273,34 +273,43 @@ pub fn calibrate(
     })
 }
 
-fn carry_out(
-    calibration: &Calibration,
-    model: &mut Model,
-    say: &mut dyn FnMut(&str),
-) -> Result<Outcome, Error> {
+/// How the search goes: more starts where tests are quick.
+fn wish(calibration: &Calibration, model: &Model) -> Wish {
     let file = &calibration.file;
     let starts = file.starts.as_ref().map(|starts| *starts.get_ref());
-    let is_slow = model
-        .tests
-        .iter()
-        .any(|test| matches!(test.subject, Subject::Case(_)));
-    let wish = Wish {
+    let is_case = |test: &Test| matches!(test.subject, Subject::Case(_));
+    let is_slow = model.tests.iter().any(is_case);
+    Wish {
         starts: starts.unwrap_or(if is_slow { 2 } else { 8 }),
         seed: file.seed,
         variance: file.variance,
         confidence: *file.confidence.get_ref(),
         profiles: file.profiles,
-    };
-    let mut counted: Vec<f64> = model
-        .parameters
-        .iter()
-        .map(|p| p.counted(p.start))
-        .collect();
+    }
+}
+
+/// What the stages have found.
+struct Found {
+    /// All parameters as the search counts them.
+    counted: Vec<f64>,
+    stages: Vec<Stage>,
+    errors: Errors,
+    words: Vec<String>,
+}
+
+/// Fits stage after stage.
+fn fit_all(
+    model: &mut Model,
+    groups: &[Group],
+    wish: Wish,
+    say: &mut dyn FnMut(&str),
+) -> Result<Found, Error> {
+    let parameters = model.parameters.iter();
+    let mut counted: Vec<f64> = parameters.map(|p| p.counted(p.start)).collect();
     let mut words = std::mem::take(&mut model.notes);
     let mut stages = Vec::new();
     let mut errors = Errors::new(model);
-    let groups = groups(calibration, model);
-    for group in &groups {
+    for group in groups {
         let Some(stage) = fit(model, group, &counted, wish, say)? else {
             let message = format!(
                 "stage `{}`: with no start can all tests be computed: {}",
@@ -321,6 +330,28 @@ fn carry_out(
         words.extend(of_stage.into_iter().map(name));
         stages.push(stage);
     }
+    Ok(Found {
+        counted,
+        stages,
+        errors,
+        words,
+    })
+}
+
+fn carry_out(
+    calibration: &Calibration,
+    model: &mut Model,
+    say: &mut dyn FnMut(&str),
+) -> Result<Outcome, Error> {
+    let file = &calibration.file;
+    let wish = wish(calibration, model);
+    let groups = groups(calibration, model);
+    let Found {
+        counted,
+        stages,
+        errors,
+        mut words,
+    } = fit_all(model, &groups, wish, say)?;
     let places = 0..model.parameters.len();
     let places = places.map(|parameter| last_stage(&stages, parameter).unwrap_or((0, 0)));
     let places: Vec<(usize, usize)> = places.collect();

@@ -99,10 +99,7 @@ pub fn dry_run(case: &Case, folder: &Path, observer: &mut dyn Observer) -> Resul
     let simulation = Simulation::new(problem.clone()).map_err(|error| case.place(error))?;
     let wanted = case.wanted(&simulation)?;
     let about = case.about(&laws, mesh_file.as_ref());
-    let mut warnings = all_warnings(case, &laws, (&simulation, &wanted), notes);
-    for warning in &warnings {
-        observer.warning(warning);
-    }
+    let mut warnings = tell_warnings(case, &laws, (&simulation, &wanted), notes, observer);
     // What the laws make of the initial stress is known once the first phase starts. The report shows
     // what is before that, so another simulation starts.
     let mut start = Start {
@@ -141,12 +138,13 @@ fn was_said(warning: &Warning) -> bool {
     matches!(warning, Warning::NoTime { .. })
 }
 
-/// Warnings about a case before its first phase.
-fn all_warnings(
+/// Tells the warnings about a case before its first phase, and returns them.
+fn tell_warnings(
     case: &Case,
     laws: &Laws,
     (simulation, wanted): (&Simulation, &OutputRequest),
     notes: Vec<String>,
+    observer: &mut dyn Observer,
 ) -> Vec<String> {
     let of_laws = laws.values().flat_map(|law| law.warnings.iter().cloned());
     let mut all: Vec<String> = of_laws.chain(simulation.warnings().to_vec()).collect();
@@ -154,6 +152,9 @@ fn all_warnings(
     all.extend(case.warnings(simulation));
     let pile = wanted.pile.iter();
     all.extend(pile.flat_map(|pile| pile.warnings(simulation)));
+    for warning in &all {
+        observer.warning(warning);
+    }
     all
 }
 
@@ -244,21 +245,13 @@ impl Ready<'_> {
         options: Options,
     ) -> Result<Figures, Error> {
         let Self { case, posed, .. } = self;
-        #[cfg(unix)]
-        {
-            reuse.announces = Some(crate::memory::expect);
-        }
+        announce_memory(reuse);
         let mut simulation = Simulation::reusing(posed.problem, std::mem::take(reuse))
             .map_err(|error| case.place(error))?;
         let wanted = case.wanted(&simulation)?;
         let about = case.about(&posed.laws, posed.mesh_file.as_ref());
         let keeper = Keeper::new(self.identity, folder, options);
-        let found = if options.resume {
-            keeper.found()?
-        } else {
-            None
-        };
-        let (mut results, warnings) = match found {
+        let (mut results, warnings) = match keeper.found()? {
             Some(checkpoint) if checkpoint.run.is_none() => {
                 checkpoint.results.check(folder)?;
                 observer.resumed(None);
@@ -270,10 +263,7 @@ impl Ready<'_> {
             }
             None => {
                 let seen = (&simulation, &wanted);
-                let warnings = all_warnings(case, &posed.laws, seen, posed.notes);
-                for warning in &warnings {
-                    observer.warning(warning);
-                }
+                let warnings = tell_warnings(case, &posed.laws, seen, posed.notes, observer);
                 let results = Recorder::create(folder, wanted, &about, &simulation)?;
                 (results, warnings)
             }
@@ -292,28 +282,17 @@ impl Ready<'_> {
             fault: None,
         };
         let outcome = follower.follow(case, &mut simulation);
-        let Follower {
-            observer,
-            mut results,
-            keeper,
-            warnings,
-            ..
-        } = follower;
-        let finished = results.finish(
-            simulation.groups(),
-            self.started.elapsed(),
-            &warnings,
-            &ending(outcome.as_ref().err()),
-        );
-        process::writes(None);
-        observer.written(results.known());
+        let outcome = follower.finish(outcome, &simulation, self.started);
         *reuse = simulation.into_reuse();
-        let is_done = outcome.is_ok();
-        outcome.and(finished.map_err(Error::from))?;
-        if is_done {
-            keeper.end(&results, &warnings)?;
-        }
-        Ok(results.figures().clone())
+        outcome
+    }
+}
+
+/// Has the solver say how much memory it is about to need.
+fn announce_memory(reuse: &mut Reuse) {
+    #[cfg(unix)]
+    {
+        reuse.announces = Some(crate::memory::expect);
     }
 }
 
@@ -372,6 +351,29 @@ impl Follower<'_> {
         });
         self.tell_results(outcome.is_ok());
         outcome
+    }
+
+    /// Writes what is left to write after this outcome.
+    fn finish(
+        mut self,
+        outcome: Result<(), Error>,
+        simulation: &Simulation,
+        started: Instant,
+    ) -> Result<Figures, Error> {
+        let finished = self.results.finish(
+            simulation.groups(),
+            started.elapsed(),
+            &self.warnings,
+            &ending(outcome.as_ref().err()),
+        );
+        process::writes(None);
+        self.observer.written(self.results.known());
+        let is_done = outcome.is_ok();
+        outcome.and(finished.map_err(Error::from))?;
+        if is_done {
+            self.keeper.end(&self.results, &self.warnings)?;
+        }
+        Ok(self.results.figures().clone())
     }
 
     fn say(&mut self, message: &str) {

@@ -20,7 +20,8 @@ use input::{Case, Study};
 use law::{Opener, hexadecimal_sha256};
 use mechanics::Simulation;
 use results::study::{
-    ParameterRecord, Record, Row, Standing, State, forget_run, identity_of_run, is_study, standing,
+    Output, ParameterRecord, Record, Row, Standing, State, forget_run, identity_of_run, is_study,
+    standing,
 };
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -133,11 +134,8 @@ impl Plan {
         };
         note(&of_first);
         let problem = of_first.into_problem();
-        let phases: Vec<String> = problem
-            .phases
-            .iter()
-            .map(|phase| phase.name.clone())
-            .collect();
+        let phases = problem.phases.iter().map(|phase| phase.name.clone());
+        let phases: Vec<String> = phases.collect();
         let simulation = Simulation::new(problem).map_err(|error| placed(case.place(error)))?;
         let wanted = case.wanted(&simulation).map_err(placed)?;
         let columns: Vec<&str> = wanted.columns().collect();
@@ -170,7 +168,17 @@ impl Plan {
                 })?;
             }
         }
-        let texts = self.texts(&case);
+        Ok(self.record(&case, files, outputs))
+    }
+
+    /// The record of the study: `files` that its runs name with the sums of what is in them, and `outputs`.
+    fn record(
+        &self,
+        case: &Case,
+        files: BTreeMap<String, BTreeSet<String>>,
+        outputs: Vec<Output>,
+    ) -> Record {
+        let texts = self.texts(case);
         let mut identity = texts.clone();
         let sums: BTreeSet<&String> = files.values().flatten().collect();
         identity.extend(sums.into_iter().flat_map(|sum| [sum, "\n"]));
@@ -178,7 +186,7 @@ impl Plan {
             "" => self.study.name(),
             title => title.to_owned(),
         };
-        Ok(Record {
+        Record {
             program: format!("pilum {}", env!("CARGO_PKG_VERSION")),
             title,
             design: self.design(),
@@ -189,7 +197,7 @@ impl Plan {
             files,
             parameters: self.study.parameters.iter().map(described).collect(),
             outputs,
-        })
+        }
     }
 
     /// Method and seed in words.

@@ -76,6 +76,26 @@ fn axes(outcome: &Outcome, is_predicted: bool) -> Vec<(String, String)> {
     all
 }
 
+/// Names of the columns: x, and one for each curve.
+fn columns(curves: &[(&str, &FittedCurve)]) -> Vec<String> {
+    let mut columns = vec!["x".to_owned()];
+    for (place, (test, fitted)) in curves.iter().enumerate() {
+        let of_test = curves.iter().filter(|(other, _)| other == test).count();
+        let part = fitted.curve.stretch.filter(|_| of_test > 1);
+        let column = match part {
+            Some(part) => format!("{test}, part {}", part + 1),
+            None => (*test).to_owned(),
+        };
+        let column = if columns.contains(&column) {
+            format!("{column} {}", place + 1)
+        } else {
+            column
+        };
+        columns.push(column);
+    }
+    columns
+}
+
 /// Computed curves with their measured points, all tests in one figure.
 fn fit(
     outcome: &Outcome,
@@ -89,21 +109,7 @@ fn fit(
     let Some((_, first)) = of_axes.first() else {
         return Err(Error::internal("a figure without curves"));
     };
-    let mut columns = vec!["x".to_owned()];
-    for (place, (test, fitted)) in of_axes.iter().enumerate() {
-        let of_test = of_axes.iter().filter(|(other, _)| other == test).count();
-        let part = fitted.curve.stretch.filter(|_| of_test > 1);
-        let column = match part {
-            Some(part) => format!("{test}, part {}", part + 1),
-            None => (*test).to_owned(),
-        };
-        let column = if columns.contains(&column) {
-            format!("{column} {}", place + 1)
-        } else {
-            column
-        };
-        columns.push(column);
-    }
+    let columns = columns(&of_axes);
     let measured = of_axes
         .iter()
         .enumerate()
@@ -142,17 +148,13 @@ fn fit(
 fn profile(outcome: &Outcome, parameter: usize, name: &str) -> Option<Figures> {
     let (stage, place) = outcome.places[parameter];
     let stage = &outcome.stages[stage];
-    let profile = stage
-        .profiles
-        .get(place)
-        .filter(|profile| profile.points.len() > 2)?;
-    let p = &outcome.parameters[parameter];
-    if stage.variance <= 0.0 {
+    let profile = stage.profiles.get(place)?;
+    if profile.points.len() <= 2 || stage.variance <= 0.0 {
         return None;
     }
-    let columns = ["x", "profile", "from the covariance", "limit"]
-        .map(str::to_owned)
-        .to_vec();
+    let p = &outcome.parameters[parameter];
+    let columns = ["x", "profile", "from the covariance", "limit"];
+    let columns = columns.map(str::to_owned).to_vec();
     let figure = Figure {
         name: name.to_owned(),
         title: Some(format!("{}: growth of the sum of squares", p.name)),
@@ -182,14 +184,11 @@ fn profile(outcome: &Outcome, parameter: usize, name: &str) -> Option<Figures> {
         for k in 0..=SMOOTH {
             let part = k as f64 / SMOOTH as f64;
             let (at, growth) = (u + part * (v - u), (a + part * (b - a)).powi(2));
-            let straight = stage
-                .error(place)
-                .map(|error| ((at - best) / error).powi(2));
+            let error = stage.error(place);
+            let straight = error.map(|error| ((at - best) / error).powi(2));
             let straight = straight.filter(|value| *value < 2.0 * limit);
-            figures.add(
-                &[Some(p.value(at)), Some(growth), straight, Some(limit)],
-                |_| true,
-            );
+            let row = [Some(p.value(at)), Some(growth), straight, Some(limit)];
+            figures.add(&row, |_| true);
         }
     }
     Some(figures)

@@ -127,6 +127,19 @@ const ITERATIONS: usize = 60;
 /// Longest step of the search: by a factor of e, or by the width of a range.
 const LONGEST: f64 = 1.0;
 
+/// When a search stops: what computed values are known to leaves nothing to look for.
+fn settings(model: &Model, group: &Group) -> Settings {
+    let exactness = model.exactness_of(&group.tests);
+    Settings {
+        reduction: 0.1 * exactness,
+        step: (1e-2 * exactness.sqrt()).max(1e-9),
+        gradient: exactness.sqrt().min(1e-3),
+        least: known_to(model, group).derivatives,
+        iterations: ITERATIONS,
+        longest: LONGEST,
+    }
+}
+
 /// Fits a group; `values` are all parameters of the model as the search counts, those of the group where
 /// it starts. `None` if the tests can be computed at no start.
 ///
@@ -140,20 +153,11 @@ pub(super) fn fit(
     say: &mut dyn FnMut(&str),
 ) -> Result<Option<Stage>, Error> {
     let own = group.parameters.iter();
-    let exactness = model.exactness_of(&group.tests);
-    let settings = Settings {
-        reduction: 0.1 * exactness,
-        step: (1e-2 * exactness.sqrt()).max(1e-9),
-        gradient: exactness.sqrt().min(1e-3),
-        least: known_to(model, group).derivatives,
-        iterations: ITERATIONS,
-        longest: LONGEST,
-    };
     let mut fit = Fit {
         bounds: own.map(|&p| model.parameters[p].counted_bounds()).collect(),
+        settings: settings(model, group),
         model,
         group,
-        settings,
         values,
         wish,
         say,

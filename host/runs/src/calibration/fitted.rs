@@ -10,6 +10,7 @@ use super::stage::{Group, Stage, known_to, last_stage};
 use super::statistics::{of_neighbours, two_sided};
 use super::systematic::{Limits, Systematic};
 use crate::Error;
+use crate::experiment::Rows;
 use input::calibration::Variance;
 
 /// A test next to its measured points.
@@ -68,6 +69,20 @@ struct Scatter {
     quantile: f64,
 }
 
+impl Scatter {
+    /// Standard deviation of a new measured value at each point of a test.
+    fn deviations(&self, test: &Test, known: &[Known]) -> Vec<Option<f64>> {
+        let noise = test.curves.iter().flat_map(|curve| &curve.deviations);
+        let of_known = |(known, noise): (&Known, &f64)| match known {
+            Known::Variance(variance) if self.quantile.is_finite() => {
+                Some((self.variance * (variance + noise * noise)).sqrt())
+            }
+            _ => None,
+        };
+        known.iter().zip(noise).map(of_known).collect()
+    }
+}
+
 /// Part of a prediction's deviation from which on a parameter without a limit is named.
 const COUNTS: f64 = 0.1;
 /// A prediction depends on what is not determined if it changes by more than this part of its noise
@@ -94,56 +109,34 @@ pub(super) fn fitted(
     let mut said = Said::default();
     let mut all = Vec::new();
     for number in 0..model.tests.len() {
-        let computed = model.computed(number, counted)?;
-        let rows = model.rows(number, counted)?;
-        let (Ok(computed), Ok(rows)) = (computed, rows) else {
-            let why = model.first_failure.clone().unwrap_or_default();
-            let name = &model.tests[number].name;
-            let message = format!("test `{name}` cannot be computed with the values found: {why}");
-            return Err(Error::usage(message));
-        };
+        let (computed, rows) = computed(model, number, counted)?;
         let gradients = model.gradients(number, counted, &of)?;
         let held = on_bounds(model, stages, number);
         let by_held = model.gradients(number, counted, &held)?;
         let test = &model.tests[number];
         let known = known(model, number, (errors, &of, &gradients), scatter);
-        let noise = test.curves.iter().flat_map(|curve| &curve.deviations);
-        let of_known = |(known, noise): (&Known, &f64)| match known {
-            Known::Variance(variance) if scatter.quantile.is_finite() => {
-                Some((scatter.variance * (variance + noise * noise)).sqrt())
-            }
-            _ => None,
-        };
-        let deviations: Vec<Option<f64>> = known.iter().zip(noise).map(of_known).collect();
-        said.others.extend(without_interval(model, test, &known));
-        said.others.extend(without_limit(
+        let deviations = scatter.deviations(test, &known);
+        let others = &mut said.others;
+        others.extend(without_interval(model, test, &known));
+        let of_gradients = (of.as_slice(), gradients.as_slice());
+        others.extend(without_limit(
             model,
             stages,
             test,
-            (&of, &gradients),
+            of_gradients,
             &deviations,
         ));
-        said.others
-            .extend(on_a_bound(model, test, (&held, &by_held), &deviations));
+        others.extend(on_a_bound(model, test, (&held, &by_held), &deviations));
         let values_found = model.values(counted);
         let values = test.of_curves(&computed).zip(test.of_curves(&deviations));
+        let none = |_| Error::internal(format!("a curve of test `{}` that is none", test.name));
         let mut curves = Vec::new();
-        for (place, ((curve, computed), (_, deviations))) in values.enumerate() {
-            let line = curve.line(&rows, &values_found).map_err(|_| {
-                Error::internal(format!("a curve of test `{}` that is none", test.name))
-            })?;
-            let mut fitted = curve_of(curve, computed, line, deviations, scatter);
-            if !test.is_predicted {
-                if misfit::is_bad(curve, computed) {
-                    let at_start = &test.at_start[place];
-                    said.bad
-                        .push(misfit::in_words(&test.name, curve, computed, at_start));
-                }
-                fitted.systematic = Systematic::of(curve, computed, limits);
-                said.bad
-                    .extend(fitted.systematic.in_words(&test.name, &fitted));
-            }
-            curves.push(fitted);
+        for ((curve, computed), (_, deviations)) in values {
+            let line = curve.line(&rows, &values_found).map_err(none)?;
+            curves.push(curve_of(curve, computed, line, deviations, scatter));
+        }
+        if !test.is_predicted {
+            judge(test, &mut curves, limits, &mut said.bad);
         }
         all.push(Fitted {
             name: test.name.clone(),
@@ -153,6 +146,31 @@ pub(super) fn fitted(
         });
     }
     Ok((all, said))
+}
+
+/// A test computed with the values found: values at the measured points, and all rows.
+fn computed(model: &mut Model, number: usize, counted: &[f64]) -> Result<(Vec<f64>, Rows), Error> {
+    let computed = model.computed(number, counted)?;
+    let rows = model.rows(number, counted)?;
+    if let (Ok(computed), Ok(rows)) = (computed, rows) {
+        return Ok((computed, rows));
+    }
+    let why = model.first_failure.clone().unwrap_or_default();
+    let name = &model.tests[number].name;
+    let message = format!("test `{name}` cannot be computed with the values found: {why}");
+    Err(Error::usage(message))
+}
+
+/// Notes which curves of a test are fitted badly, or have residuals that are not noise.
+fn judge(test: &Test, curves: &mut [FittedCurve], limits: Limits, bad: &mut Vec<String>) {
+    for (fitted, at_start) in curves.iter_mut().zip(&test.at_start) {
+        let (curve, computed) = (&fitted.curve, &fitted.computed);
+        if misfit::is_bad(curve, computed) {
+            bad.push(misfit::in_words(&test.name, curve, computed, at_start));
+        }
+        fitted.systematic = Systematic::of(curve, computed, limits);
+        bad.extend(fitted.systematic.in_words(&test.name, fitted));
+    }
 }
 
 /// Uncertainty of the computed values of a test, curve by curve, since their units differ.

@@ -18,6 +18,12 @@ const WIDE_FACTOR: f64 = 4.0;
 /// Part of a direction below which a parameter is not named.
 const PART: f64 = 0.1;
 
+const EXACT: &str = "the residuals are smaller than what computed values are known to, as those of points that the law \
+                     itself has made: nothing is told of the scatter of measured values, and intervals are those of \
+                     the numbers";
+const NO_FREEDOM: &str =
+    "there are no more measured points than parameters: nothing is left to tell how exact they are";
+
 /// Notes of a stage, the most important first.
 ///
 /// # Errors
@@ -32,11 +38,7 @@ pub(super) fn of_stage(
     let own = stage.group.parameters.iter();
     let parameters: Vec<Parameter> = own.map(|&p| model.parameters[p].clone()).collect();
     if stage.is_exact && variance == Variance::Estimated {
-        words.push(
-            "the residuals are smaller than what computed values are known to, as those of points that the law itself has \
-             made: nothing is told of the scatter of measured values, and intervals are those of the numbers"
-                .to_owned(),
-        );
+        words.push(EXACT.to_owned());
     }
     let is_bad = is_bad(model, stage);
     words.extend(of_end(stage.end).map(str::to_owned));
@@ -46,11 +48,9 @@ pub(super) fn of_stage(
             words.push(unseen(model, &stage.group.tests, asked, values, is_bad)?);
             continue;
         }
-        match stage.on_bound[place] {
-            [true, _] => words.push(at_end(parameter, "least", parameter.bounds[0])),
-            [_, true] => words.push(at_end(parameter, "greatest", parameter.bounds[1])),
-            _ => {}
-        }
+        let ends = ["least", "greatest"].iter().zip(parameter.bounds);
+        let is_on = ends.zip(stage.on_bound[place]).find(|(_, is_on)| *is_on);
+        words.extend(is_on.map(|((which, bound), _)| at_end(parameter, which, bound)));
     }
     of_directions(stage, &parameters, &mut words);
     for (place, parameter) in parameters.iter().enumerate() {
@@ -69,9 +69,7 @@ pub(super) fn of_stage(
     }
     words.extend(of_noise(model, stage, variance));
     if stage.degrees == 0 {
-        words.push(
-            "there are no more measured points than parameters: nothing is left to tell how exact they are".to_owned(),
-        );
+        words.push(NO_FREEDOM.to_owned());
     }
     Ok(words)
 }
@@ -395,34 +393,7 @@ fn unseen(
             digits(value)
         ));
     }
-    let mut moved: Vec<String> = Vec::new();
-    let mut all = Vec::new();
-    let mut compared: Vec<String> = Vec::new();
-    for &test in tests {
-        compared.extend(
-            model.tests[test]
-                .curves
-                .iter()
-                .flat_map(|c| [c.x.clone(), c.y.clone()]),
-        );
-        let Ok(here) = model.rows(test, values)? else {
-            continue;
-        };
-        for sign in [1.0, -1.0] {
-            let mut other = values.to_vec();
-            other[number] += sign * TRIED;
-            if let Ok(there) = model.rows(test, &other)? {
-                for name in changes(&here, &there) {
-                    if !moved.contains(&name) {
-                        moved.push(name);
-                    }
-                }
-                break;
-            }
-        }
-        all.push((test, here));
-    }
-    moved.retain(|name| !compared.contains(name));
+    let (all, moved) = moved(model, tests, number, values)?;
     let head = format!("`{name}` cannot be identified: no measured curve changes with it");
     if !moved.is_empty() {
         let names: Vec<String> = moved.iter().map(|name| format!("`{name}`")).collect();
@@ -445,6 +416,41 @@ fn unseen(
     Ok(format!(
         "{head}, nor does anything else in these tests{why}; fix it, or add a test of another kind"
     ))
+}
+
+/// Rows of tests, each with its number.
+type AllRows = Vec<(usize, Rows)>;
+
+/// What the tests that can be computed give, and the columns without a measured curve that a parameter moves.
+fn moved(
+    model: &mut Model,
+    tests: &[usize],
+    number: usize,
+    values: &[f64],
+) -> Result<(AllRows, Vec<String>), Error> {
+    let mut moved: Vec<String> = Vec::new();
+    let mut all = Vec::new();
+    for &test in tests {
+        let Ok(here) = model.rows(test, values)? else {
+            continue;
+        };
+        for sign in [1.0, -1.0] {
+            let mut other = values.to_vec();
+            other[number] += sign * TRIED;
+            if let Ok(there) = model.rows(test, &other)? {
+                for name in changes(&here, &there) {
+                    if !moved.contains(&name) {
+                        moved.push(name);
+                    }
+                }
+                break;
+            }
+        }
+        all.push((test, here));
+    }
+    let curves = || tests.iter().flat_map(|&test| &model.tests[test].curves);
+    moved.retain(|name| !curves().any(|curve| curve.x == *name || curve.y == *name));
+    Ok((all, moved))
 }
 
 /// Another value of a parameter with which measured curves are others.

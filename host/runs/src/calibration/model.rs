@@ -189,6 +189,14 @@ impl Model {
         all.fold(0.0, f64::max)
     }
 
+    /// The weight of each residual of some tests.
+    pub(super) fn weights(&self, tests: &[usize]) -> Vec<f64> {
+        let curves = tests.iter().flat_map(|&test| &self.tests[test].curves);
+        curves
+            .flat_map(|curve| std::iter::repeat_n(curve.weight, curve.points.len()))
+            .collect()
+    }
+
     /// A parameter that moves the values of some tests by less than this, relative to the largest,
     /// is not seen: their differences are not known better.
     pub(super) fn blind_in(&self, tests: &[usize]) -> f64 {

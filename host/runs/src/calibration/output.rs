@@ -146,38 +146,9 @@ impl Outcome {
     /// Output of the command: values, intervals, notes, the set to paste.
     pub fn text(&self) -> String {
         let mut text = format!("{}\n", self.title);
-        let rows = (0..self.parameters.len()).map(|i| {
-            let p = &self.parameters[i];
-            [
-                p.name.clone(),
-                digits(self.values[i]),
-                self.interval_in_words(i),
-                p.unit.clone(),
-            ]
-        });
-        let interval = format!("{} % interval", digits(100.0 * self.confidence));
-        let head = [
-            "parameter".to_owned(),
-            "value".to_owned(),
-            interval,
-            "unit".to_owned(),
-        ];
-        let rows: Vec<[String; 4]> = std::iter::once(head).chain(rows).collect();
-        text += &aligned(&rows);
-        let mut fits = vec![["test", "curve", "points", "rms"].map(str::to_owned)];
-        for test in &self.tests {
-            for fitted in &test.curves {
-                let name = if test.is_predicted {
-                    format!("{} (predicted)", test.name)
-                } else {
-                    test.name.clone()
-                };
-                let points = fitted.curve.points.len().to_string();
-                fits.push([name, fitted.curve.y.clone(), points, digits(fitted.rms)]);
-            }
-        }
+        text += &aligned(&self.table_of_parameters());
         text.push('\n');
-        text += &aligned(&fits);
+        text += &aligned(&self.table_of_curves());
         for stage in &self.stages {
             let name = if self.stages.len() > 1 {
                 format!("stage `{}`: ", stage.group.name)
@@ -213,6 +184,44 @@ impl Outcome {
         }
         let _ = write!(text, "\n{}", self.block);
         text
+    }
+
+    /// Names, values, intervals and units, below their heads.
+    fn table_of_parameters(&self) -> Vec<[String; 4]> {
+        let rows = (0..self.parameters.len()).map(|i| {
+            let p = &self.parameters[i];
+            [
+                p.name.clone(),
+                digits(self.values[i]),
+                self.interval_in_words(i),
+                p.unit.clone(),
+            ]
+        });
+        let interval = format!("{} % interval", digits(100.0 * self.confidence));
+        let head = [
+            "parameter".to_owned(),
+            "value".to_owned(),
+            interval,
+            "unit".to_owned(),
+        ];
+        std::iter::once(head).chain(rows).collect()
+    }
+
+    /// Tests, curves, numbers of points and the root of the mean square, below their heads.
+    fn table_of_curves(&self) -> Vec<[String; 4]> {
+        let mut fits = vec![["test", "curve", "points", "rms"].map(str::to_owned)];
+        for test in &self.tests {
+            for fitted in &test.curves {
+                let name = if test.is_predicted {
+                    format!("{} (predicted)", test.name)
+                } else {
+                    test.name.clone()
+                };
+                let points = fitted.curve.points.len().to_string();
+                fits.push([name, fitted.curve.y.clone(), points, digits(fitted.rms)]);
+            }
+        }
+        fits
     }
 }
 

@@ -90,6 +90,16 @@ struct Walk<'s> {
 }
 
 impl Walk<'_> {
+    /// The next value, within the bound.
+    fn target(&self, value: f64, step: f64) -> f64 {
+        let target = value + self.sign * step;
+        if self.sign < 0.0 {
+            target.max(self.bound)
+        } else {
+            target.min(self.bound)
+        }
+    }
+
     #[expect(clippy::float_cmp, reason = "a value that was brought to its bound")]
     fn walk(&mut self, others: &mut Others<'_>) -> Result<Side, Error> {
         let (stage, place) = (self.stage, self.place);
@@ -108,12 +118,7 @@ impl Walk<'_> {
             if value == self.bound {
                 return Ok(Side::Bound);
             }
-            let wanted = value + self.sign * step;
-            let target = if self.sign < 0.0 {
-                wanted.max(self.bound)
-            } else {
-                wanted.min(self.bound)
-            };
+            let target = self.target(value, step);
             let Some((u, sum)) = others(target, &near)? else {
                 // The law cannot follow there: a shorter step may do.
                 is_barred = true;

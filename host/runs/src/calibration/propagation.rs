@@ -11,9 +11,9 @@
 //! not 0.
 
 use super::model::Model;
-use super::stage::Stage;
+use super::stage::{Group, Stage};
 use crate::Error;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// Errors of all parameters.
 #[derive(Clone, Debug)]
@@ -51,6 +51,20 @@ impl Errors {
         }
     }
 
+    /// What the parameters of a stage do where its own measured values change.
+    fn of_own_points(&self, model: &Model, group: &Group, answer: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut rows = DMatrix::zeros(answer.nrows(), self.by_point.ncols());
+        let mut row = 0;
+        for &test in &group.tests {
+            for (point, weight) in model.weights(&[test]).into_iter().enumerate() {
+                let mut column = rows.column_mut(self.first[test] + point);
+                column -= answer.column(row) * weight.sqrt();
+                row += 1;
+            }
+        }
+        rows
+    }
+
     /// Takes in a stage, whose end is at `counted`.
     ///
     /// # Errors
@@ -63,39 +77,23 @@ impl Errors {
     ) -> Result<(), Error> {
         let group = &stage.group;
         let variables = &stage.covariance.variables;
-        let numbers: Vec<usize> = variables
-            .iter()
-            .map(|&place| group.parameters[place])
-            .collect();
+        let numbers = variables.iter().map(|&place| group.parameters[place]);
+        let numbers: Vec<usize> = numbers.collect();
         let answer = stage.covariance.answer(&stage.jacobian);
-        let held: Vec<usize> = (0..model.parameters.len())
-            .filter(|p| !group.parameters.contains(p) && self.is_known(*p))
-            .collect();
+        let n = model.parameters.len();
+        let is_held = |p: &usize| !group.parameters.contains(p) && self.is_known(*p);
+        let held: Vec<usize> = (0..n).filter(is_held).collect();
         let by_held = Self::by_held(model, group.tests.as_slice(), counted, &held)?;
         // Rows of this stage: its own measured values, and what the held ones do.
-        let mut rows = DMatrix::zeros(variables.len(), self.by_point.ncols());
-        let mut row = 0;
-        for &test in &group.tests {
-            let of_test = &model.tests[test];
-            let weights = of_test
-                .curves
-                .iter()
-                .flat_map(|curve| std::iter::repeat_n(curve.weight.sqrt(), curve.points.len()));
-            for (point, root) in weights.enumerate() {
-                let mut column = rows.column_mut(self.first[test] + point);
-                column -= answer.column(row) * root;
-                row += 1;
-            }
-        }
+        let mut rows = self.of_own_points(model, group, &answer);
         let follow = by_held.as_ref().map(|by_held| &answer * by_held);
         if let Some(follow) = &follow {
             rows += follow * self.by_point.select_rows(&held);
         }
         for direction in &mut self.open {
-            let moved = follow.as_ref().map(|follow| {
-                let held: Vec<f64> = held.iter().map(|&p| direction[p]).collect();
-                follow * nalgebra::DVector::from_vec(held)
-            });
+            let of_held = held.iter().map(|&p| direction[p]);
+            let of_held = DVector::from_iterator(held.len(), of_held);
+            let moved = follow.as_ref().map(|follow| follow * of_held);
             group.parameters.iter().for_each(|&p| direction[p] = 0.0);
             for (k, &p) in numbers.iter().enumerate() {
                 direction[p] = moved.as_ref().map_or(0.0, |moved| moved[k]);
@@ -111,8 +109,7 @@ impl Errors {
         if follow.is_none() {
             // What the held ones do cannot be computed: nothing is known of these.
             let all = |p: usize| if numbers.contains(&p) { 1.0 } else { 0.0 };
-            self.open
-                .push((0..model.parameters.len()).map(all).collect());
+            self.open.push((0..n).map(all).collect());
         }
         self.open
             .retain(|direction| direction.iter().any(|d| d.abs() > 0.0));

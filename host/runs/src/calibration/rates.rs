@@ -139,6 +139,53 @@ fn rates_of_values(driver: &Driver, state: &State, rate: &State) -> Vec<f64> {
     rates
 }
 
+/// Rates at the end of an increment, from those at its start.
+fn over_increment(
+    probe: &Probe,
+    [before, after]: [&State; 2],
+    rates: &State,
+    goals: &[Goal],
+    direction: &[f64],
+) -> Option<State> {
+    let n = goals.len();
+    let start = PointStart {
+        gradient0: before.gradient.clone(),
+        gradient1: after.gradient.clone(),
+        flux0: before.flux.clone(),
+        state0: before.internal.clone(),
+    };
+    let given = PointRates {
+        gradient0: rates.gradient.clone(),
+        gradient1: vec![0.0; n],
+        flux0: rates.flux.clone(),
+        state0: rates.internal.clone(),
+    };
+    let (answer, own) = probe
+        .rates(std::slice::from_ref(&start), &[given], direction)
+        .ok()?;
+    let points = answer.points.first();
+    let end = points.filter(|end| end.status == raw::PILUM_OK)?;
+    if !is_same(&end.flux, &after.flux) || !is_same(&end.state, &after.internal) {
+        return None;
+    }
+    let (mut flux, mut internal) = own.into_iter().next()?;
+    let by_gradient = by_gradient(probe, &start, n, &vec![0.0; direction.len()])?;
+    let gradient = gradient_rate(goals, &flux, &by_gradient)?;
+    for (rate, (by_flux, by_internal)) in gradient.iter().zip(&by_gradient) {
+        let fluxes = flux.iter_mut().zip(by_flux);
+        let internals = internal.iter_mut().zip(by_internal);
+        fluxes
+            .chain(internals)
+            .for_each(|(sum, by)| *sum += rate * by);
+    }
+    Some(State {
+        gradient,
+        flux,
+        internal,
+        time: 0.0,
+    })
+}
+
 /// Rates of all states for a direction of the parameters.
 fn along(
     probe: &Probe,
@@ -147,7 +194,6 @@ fn along(
     direction: &[f64],
 ) -> Option<Vec<State>> {
     let n = driver.point().law().n_components();
-    let nothing = vec![0.0; direction.len()];
     let mut rates = vec![start(probe, driver, &states[0], direction)?];
     let mut held = vec![0.0; n];
     let mut k = 0;
@@ -155,50 +201,10 @@ fn along(
         let (first_gradient, first_flux) = (rates[k].gradient.clone(), held.clone());
         for increment in 1..=segment.increments {
             let part = increment as f64 / segment.increments as f64;
-            let (before, after) = (&states[k], &states[k + 1]);
-            let start = PointStart {
-                gradient0: before.gradient.clone(),
-                gradient1: after.gradient.clone(),
-                flux0: before.flux.clone(),
-                state0: before.internal.clone(),
-            };
-            let given = PointRates {
-                gradient0: rates[k].gradient.clone(),
-                gradient1: vec![0.0; n],
-                flux0: rates[k].flux.clone(),
-                state0: rates[k].internal.clone(),
-            };
-            let (answer, own) = probe
-                .rates(std::slice::from_ref(&start), &[given], direction)
-                .ok()?;
-            let end = answer
-                .points
-                .first()
-                .filter(|end| end.status == raw::PILUM_OK)?;
-            if !is_same(&end.flux, &after.flux) || !is_same(&end.state, &after.internal) {
-                return None;
-            }
-            let (flux, internal) = own.into_iter().next()?;
-            let by_gradient = by_gradient(probe, &start, n, &nothing)?;
             let goals = (0..n).map(|i| goal(segment, i, part, first_gradient[i], first_flux[i]));
             let goals: Vec<Goal> = goals.collect();
-            let gradient = gradient_rate(&goals, &flux, &by_gradient)?;
-            let total = |own: &[f64], of: &dyn Fn(usize) -> Vec<f64>| {
-                let mut total = own.to_vec();
-                for (j, rate) in gradient.iter().enumerate() {
-                    total
-                        .iter_mut()
-                        .zip(of(j))
-                        .for_each(|(sum, by)| *sum += rate * by);
-                }
-                total
-            };
-            rates.push(State {
-                flux: total(&flux, &|j| by_gradient[j].0.clone()),
-                internal: total(&internal, &|j| by_gradient[j].1.clone()),
-                gradient,
-                time: 0.0,
-            });
+            let ends = [&states[k], &states[k + 1]];
+            rates.push(over_increment(probe, ends, &rates[k], &goals, direction)?);
             k += 1;
         }
         for (i, held) in held.iter_mut().enumerate() {

@@ -47,33 +47,20 @@ impl Model {
             scratch: Scratch::new(folder, stop)?,
             rows_of_late: VecDeque::new(),
         };
-        let (mut subjects, mut laws) = (Vec::new(), Vec::new());
-        for input in &calibration.file.test {
-            let (subject, known) = subject(calibration, input, opener)?;
-            subjects.push(subject);
-            laws.push(known);
-        }
+        let read = calibration.file.test.iter();
+        let read = read.map(|input| subject(calibration, input, opener));
+        let (subjects, laws): (Vec<_>, Vec<_>) =
+            read.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
         let names = names(calibration);
         let claims = claims(calibration, &names, &laws)?;
         for (number, (input, subject)) in calibration.file.test.iter().zip(subjects).enumerate() {
             let subject = with_fixed(calibration, (number, subject), &claims)?;
-            let mut exactness = EXACTNESS_OF_DRIVERS;
-            if let Subject::Case(case) = &subject {
-                let tolerance = case.file.solver.get_ref().force_tolerance;
-                exactness = exactness.max(tolerance);
-                model.difference = model.difference.max(tolerance.sqrt().clamp(1e-3, 0.03));
+            let test = test(calibration, input, subject)?;
+            if let Subject::Case(_) = test.subject {
+                let of_case = test.exactness.sqrt().clamp(1e-3, 0.03);
+                model.difference = model.difference.max(of_case);
             }
-            let curves = curves(calibration, input, &subject)?;
-            model.tests.push(Test {
-                name: input.name.get_ref().clone(),
-                is_predicted: input.predict,
-                curves,
-                subject,
-                targets: Vec::new(),
-                exactness,
-                is_by_law: false,
-                at_start: Vec::new(),
-            });
+            model.tests.push(test);
         }
         if let Some(step) = &calibration.file.difference {
             model.difference = *step.get_ref();
@@ -82,10 +69,8 @@ impl Model {
             let Given::Free(input) = name.given else {
                 continue;
             };
-            let own = claims
-                .iter()
-                .filter(|c| std::ptr::eq(c.name.written, name.written));
-            let own: Vec<&Claim<'_>> = own.collect();
+            let is_own = |claim: &&Claim<'_>| std::ptr::eq(claim.name.written, name.written);
+            let own: Vec<&Claim<'_>> = claims.iter().filter(is_own).collect();
             if own.is_empty() {
                 return Err(name.nowhere(calibration, &laws));
             }
@@ -97,7 +82,6 @@ impl Model {
     }
 
     /// Adds a parameter, and what it stands for in each test.
-    #[expect(clippy::float_cmp, reason = "an end that was given as it is")]
     fn add(
         &mut self,
         calibration: &Calibration,
@@ -126,50 +110,16 @@ impl Model {
         let usual = declared.iter().fold(WIDE, |both, p| common(both, p.usual));
         let given = [&input.start, &input.min, &input.max];
         let [start, given @ ..] = given.map(|value| value.as_ref().map(|value| *value.get_ref()));
-        let (span, name) = (name.span(), name.get_ref());
         let Some(start) = start.or(own) else {
-            let message = format!("`{name}` needs a `start`: no test gives it a value");
-            return Err(calibration.error(span, message));
+            let message = format!(
+                "`{}` needs a `start`: no test gives it a value",
+                name.get_ref()
+            );
+            return Err(calibration.error(name.span(), message));
         };
-        let at = |value: &Option<Spanned<f64>>| value.as_ref().map_or(span.clone(), Spanned::span);
-        let outside = |key: &str, value: f64, within: String, span| {
-            let message = format!("`{key}` is {value}, outside {within} of `{}`", first.id);
-            calibration.error(span, message)
-        };
-        for (key, value) in [
-            ("start", &input.start),
-            ("min", &input.min),
-            ("max", &input.max),
-        ] {
-            let Some(value) = value else { continue };
-            let number = *value.get_ref();
-            // A bound may lie on an end that the law leaves out.
-            let is_end = key != "start" && (number == law.lower || number == law.upper);
-            if !(law.contain(number) || is_end) {
-                return Err(outside(key, number, law.to_string(), value.span()));
-            }
-        }
-        let scale = match &input.scale {
-            Some(scale) => *scale.get_ref(),
-            None if law.lower > 0.0 || law.lower == 0.0 && law.open_lower => Scale::Log,
-            None => Scale::Linear,
-        };
-        if scale == Scale::Log && start <= 0.0 {
-            let message = format!("`{name}` starts from {start}, which has no logarithm");
-            let error = calibration.error(at(&input.start), message);
-            return Err(error.with_hint("`scale = \"linear\"`, or a `start` above 0"));
-        }
-        let bounds = bounds(law, given, start, scale);
-        if bounds[0] >= bounds[1] {
-            let message = format!("`min` is {}, not below `max`, {}", bounds[0], bounds[1]);
-            return Err(calibration.error(at(&input.min), message));
-        }
-        if !(bounds[0]..=bounds[1]).contains(&start) {
-            let within = format!("[{}, {}]", bounds[0], bounds[1]);
-            return Err(outside("start", start, within, at(&input.start)));
-        }
+        let (scale, bounds) = limits(calibration, (name, &first.id), input, law, start)?;
         self.parameters.push(Parameter {
-            name: name.clone(),
+            name: name.get_ref().clone(),
             id: first.id.clone(),
             laws: input.laws.iter().map(|law| law.get_ref().clone()).collect(),
             unit: first.unit.clone(),
@@ -252,6 +202,24 @@ impl Model {
         }
         Ok(())
     }
+}
+
+/// A test before it is computed.
+fn test(calibration: &Calibration, input: &TestInput, subject: Subject) -> Result<Test, Error> {
+    let tolerance = match &subject {
+        Subject::Case(case) => case.file.solver.get_ref().force_tolerance,
+        Subject::Driver(_) => 0.0,
+    };
+    Ok(Test {
+        name: input.name.get_ref().clone(),
+        is_predicted: input.predict,
+        curves: curves(calibration, input, &subject)?,
+        subject,
+        targets: Vec::new(),
+        exactness: EXACTNESS_OF_DRIVERS.max(tolerance),
+        is_by_law: false,
+        at_start: Vec::new(),
+    })
 }
 
 /// What a test computes, with the laws that it calls.
@@ -366,6 +334,57 @@ fn common(a: Bounds, b: Bounds) -> Bounds {
         upper,
         open_upper: !(a.contain(upper) && b.contain(upper)),
     }
+}
+
+/// Scale and bounds of the search for a parameter, known to the law as `id`: what is given has to be within `law`.
+#[expect(clippy::float_cmp, reason = "an end that was given as it is")]
+fn limits(
+    calibration: &Calibration,
+    (name, id): (&Spanned<String>, &str),
+    input: &FreeInput,
+    law: Bounds,
+    start: f64,
+) -> Result<(Scale, [f64; 2]), Error> {
+    let at = |value: &Option<Spanned<f64>>| value.as_ref().map_or(name.span(), Spanned::span);
+    let outside = |key: &str, value: f64, within: String, span| {
+        let message = format!("`{key}` is {value}, outside {within} of `{id}`");
+        calibration.error(span, message)
+    };
+    for (key, value) in [
+        ("start", &input.start),
+        ("min", &input.min),
+        ("max", &input.max),
+    ] {
+        let Some(value) = value else { continue };
+        let number = *value.get_ref();
+        // A bound may lie on an end that the law leaves out.
+        let is_end = key != "start" && (number == law.lower || number == law.upper);
+        if !(law.contain(number) || is_end) {
+            return Err(outside(key, number, law.to_string(), value.span()));
+        }
+    }
+    let scale = match &input.scale {
+        Some(scale) => *scale.get_ref(),
+        None if law.lower > 0.0 || law.lower == 0.0 && law.open_lower => Scale::Log,
+        None => Scale::Linear,
+    };
+    if scale == Scale::Log && start <= 0.0 {
+        let name = name.get_ref();
+        let message = format!("`{name}` starts from {start}, which has no logarithm");
+        let error = calibration.error(at(&input.start), message);
+        return Err(error.with_hint("`scale = \"linear\"`, or a `start` above 0"));
+    }
+    let given = [&input.min, &input.max].map(|end| end.as_ref().map(|end| *end.get_ref()));
+    let bounds = bounds(law, given, start, scale);
+    if bounds[0] >= bounds[1] {
+        let message = format!("`min` is {}, not below `max`, {}", bounds[0], bounds[1]);
+        return Err(calibration.error(at(&input.min), message));
+    }
+    if !(bounds[0]..=bounds[1]).contains(&start) {
+        let within = format!("[{}, {}]", bounds[0], bounds[1]);
+        return Err(outside("start", start, within, at(&input.start)));
+    }
+    Ok((scale, bounds))
 }
 
 /// Least and greatest value that the search tries: given, else the law's, ends that the law leaves out

@@ -137,6 +137,22 @@ pub(super) fn known_to(model: &Model, group: &Group) -> Exactness {
     }
 }
 
+/// How much residuals without weights, whose noise is known, change where a parameter goes through its range.
+fn plain_answers(
+    model: &Model,
+    group: &Group,
+    jacobian: &DMatrix<f64>,
+    weights: &[f64],
+) -> Vec<f64> {
+    let columns = jacobian.column_iter().zip(&group.parameters);
+    let answer = columns.map(|(column, &parameter)| {
+        let [low, high] = model.parameters[parameter].counted_range();
+        let plain: f64 = column.iter().zip(weights).map(|(d, w)| d * d / w).sum();
+        plain.sqrt() * (high - low)
+    });
+    answer.collect()
+}
+
 /// What residuals and derivatives say of the best place.
 pub(super) fn known(
     model: &Model,
@@ -147,12 +163,7 @@ pub(super) fn known(
 ) -> Stage {
     let blind = model.blind_in(&group.tests);
     let n = best.u.len();
-    let weights: Vec<f64> = group
-        .tests
-        .iter()
-        .flat_map(|&test| &model.tests[test].curves)
-        .flat_map(|curve| std::iter::repeat_n(curve.weight, curve.points.len()))
-        .collect();
+    let weights = model.weights(&group.tests);
     let squares = best.residuals.iter().zip(&weights).map(|(r, w)| r * r / w);
     let plain_sum: f64 = squares.sum();
     let Exactness { floor, derivatives } = known_to(model, group);
@@ -160,27 +171,17 @@ pub(super) fn known(
         Variance::Estimated => (plain_sum / degrees.max(1) as f64).max(floor),
         Variance::Given => 1.0,
     };
-    let may_move = free(
-        &best.u,
-        &best.jacobian,
-        &best.residuals,
-        bounds,
-        derivatives,
-    );
-    let answers: Vec<f64> = best
-        .jacobian
-        .column_iter()
-        .map(|column| column.norm())
-        .collect();
+    let Minimum {
+        u,
+        jacobian,
+        residuals,
+        ..
+    } = best;
+    let may_move = free(u, jacobian, residuals, bounds, derivatives);
     let noise = variance_of(best.residuals.len().saturating_sub(may_move.len())).sqrt();
-    let is_seen = |place: usize| {
-        let [low, high] = model.parameters[group.parameters[place]].counted_range();
-        let range = high - low;
-        // The noise is that of residuals without weights.
-        let column = best.jacobian.column(place);
-        let plain: f64 = column.iter().zip(&weights).map(|(d, w)| d * d / w).sum();
-        plain.sqrt() * range > 1e-3 * noise && answers[place] > derivatives
-    };
+    let answers: Vec<f64> = best.jacobian.column_iter().map(|c| c.norm()).collect();
+    let by_range = plain_answers(model, group, &best.jacobian, &weights);
+    let is_seen = |i: usize| by_range[i] > 1e-3 * noise && answers[i] > derivatives;
     let seen: Vec<bool> = (0..n).map(is_seen).collect();
     let moving: Vec<usize> = may_move.iter().copied().filter(|&i| seen[i]).collect();
     let on_bound = (0..n).map(|i| {

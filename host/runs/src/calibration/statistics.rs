@@ -27,6 +27,59 @@ pub struct Covariance {
     most: f64,
 }
 
+/// What a matrix A sees of directions.
+struct Spectrum {
+    /// (AᵀA)⁻¹, of the directions that A sees.
+    inverse: DMatrix<f64>,
+    /// How many these are.
+    rank: usize,
+    /// The others.
+    blind: Vec<Vec<f64>>,
+}
+
+impl Spectrum {
+    /// `blind`: the singular value, as a part of the largest, up to which A does not see a direction.
+    fn of(a: &DMatrix<f64>, blind: f64) -> Self {
+        let n = a.ncols();
+        let svd = a.clone().svd(false, true);
+        let mut inverse = DMatrix::zeros(n, n);
+        let mut directions = Vec::new();
+        let largest = svd.singular_values.iter().fold(0.0_f64, |a, b| a.max(*b));
+        let v_t = svd.v_t.unwrap_or_else(|| DMatrix::identity(0, n));
+        let mut seen = DMatrix::zeros(n, n);
+        for (number, &value) in svd.singular_values.iter().enumerate() {
+            let v = v_t.row(number).transpose();
+            seen += &v * v.transpose();
+            if value > blind * largest {
+                inverse += &v * v.transpose() / (value * value);
+            } else {
+                directions.push(v.iter().copied().collect::<Vec<_>>());
+            }
+        }
+        let rank = n.min(a.nrows()) - directions.len();
+        // With fewer rows than columns some directions have no singular value.
+        for _ in 0..n.saturating_sub(svd.singular_values.len()) {
+            let rest = DMatrix::identity(n, n) - &seen;
+            let Some(widest) = (0..n).max_by(|&a, &b| rest[(a, a)].total_cmp(&rest[(b, b)])) else {
+                break;
+            };
+            let direction: DVector<f64> = rest.column(widest).into_owned();
+            let norm = direction.norm();
+            if norm < 1e-9 {
+                break;
+            }
+            let direction = direction / norm;
+            seen += &direction * direction.transpose();
+            directions.push(direction.iter().copied().collect());
+        }
+        Self {
+            inverse,
+            rank,
+            blind: directions,
+        }
+    }
+}
+
 /// A variable belongs to a blind direction if it has at least this part of it.
 const PART: f64 = 0.1;
 
@@ -59,48 +112,16 @@ impl Covariance {
                 most,
             };
         }
-        let norms: Vec<f64> = variables
-            .iter()
-            .map(|&i| jacobian.column(i).norm())
-            .collect();
-        let norms: Vec<f64> = norms
-            .iter()
-            .map(|&c| if c > 0.0 { c } else { 1.0 })
-            .collect();
+        let norms = variables.iter().map(|&i| jacobian.column(i).norm());
+        let norms: Vec<f64> = norms.map(|c| if c > 0.0 { c } else { 1.0 }).collect();
         let unit = DMatrix::from_fn(jacobian.nrows(), n, |row, k| {
             jacobian[(row, variables[k])] / norms[k]
         });
-        let svd = unit.clone().svd(false, true);
-        let mut inverse = DMatrix::zeros(n, n);
-        let mut directions = Vec::new();
-        let largest = svd.singular_values.iter().fold(0.0_f64, |a, b| a.max(*b));
-        let v_t = svd.v_t.unwrap_or_else(|| DMatrix::identity(0, n));
-        let mut seen = DMatrix::zeros(n, n);
-        for (number, &value) in svd.singular_values.iter().enumerate() {
-            let v = v_t.row(number).transpose();
-            seen += &v * v.transpose();
-            if value > blind * largest {
-                inverse += &v * v.transpose() / (value * value);
-            } else {
-                directions.push(v.iter().copied().collect::<Vec<_>>());
-            }
-        }
-        let rank = n.min(jacobian.nrows()) - directions.len();
-        // With fewer residuals than variables some directions have no singular value.
-        for _ in 0..n.saturating_sub(svd.singular_values.len()) {
-            let rest = DMatrix::identity(n, n) - &seen;
-            let Some(widest) = (0..n).max_by(|&a, &b| rest[(a, a)].total_cmp(&rest[(b, b)])) else {
-                break;
-            };
-            let direction: DVector<f64> = rest.column(widest).into_owned();
-            let norm = direction.norm();
-            if norm < 1e-9 {
-                break;
-            }
-            let direction = direction / norm;
-            seen += &direction * direction.transpose();
-            directions.push(direction.iter().copied().collect());
-        }
+        let Spectrum {
+            inverse,
+            rank,
+            blind,
+        } = Spectrum::of(&unit, blind);
         let weighed = DMatrix::from_fn(unit.nrows(), n, |row, k| weights[row] * unit[(row, k)]);
         let scatter = unit.transpose() * weighed;
         let growth = &inverse * scatter;
@@ -110,7 +131,7 @@ impl Covariance {
         };
         Self {
             variables: variables.to_vec(),
-            blind: directions,
+            blind,
             matrix: scaled(&matrix),
             inverse: scaled(&inverse),
             mean_growth: growth.trace() / rank.max(1) as f64,

@@ -119,9 +119,14 @@ impl Systematic {
 
     /// Its findings in words.
     pub(super) fn in_words(&self, test: &str, fitted: &FittedCurve) -> Vec<String> {
-        let mut words = Vec::new();
+        let words = [self.of_far(test, fitted), self.of_neighbours(test, fitted)];
+        words.into_iter().flatten().collect()
+    }
+
+    /// Residuals too large for noise.
+    fn of_far(&self, test: &str, fitted: &FittedCurve) -> Option<String> {
         let Curve { x, y, points, .. } = &fitted.curve;
-        if !self.far.is_empty() {
+        (!self.far.is_empty()).then(|| {
             let unit = if self.is_over_noise {
                 "the noise that is given"
             } else {
@@ -134,18 +139,21 @@ impl Systematic {
                 0 => String::new(),
                 n => format!(", and {n} more (`beyond_noise` in fit.csv)"),
             };
-            words.push(format!(
+            format!(
                 "{test}, {y}: {} of {} residuals are too large for noise, up to {most:.1} times {unit}: at {x} = {}{more}. \
                  These are bad readings, a systematic error (a slack or a wrong zero: `offset_x` and `offset_y` of the curve \
                  look for it), or the law does not follow; values and intervals are not those of the law until it is known which",
                 self.far.len(),
                 points.len(),
                 named.collect::<Vec<_>>().join(", ")
-            ));
-        }
-        if self.follow.is_empty() {
-            return words;
-        }
+            )
+        })
+    }
+
+    /// Residuals that follow each other.
+    fn of_neighbours(&self, test: &str, fitted: &FittedCurve) -> Option<String> {
+        let first = self.follow.first()?;
+        let y = &fitted.curve.y;
         let how = self.follow.iter().map(|follow| match follow {
             Follow::Correlation(rho) => format!("correlation of neighbours {rho:.2}"),
             Follow::Signs(found, expected) => {
@@ -155,19 +163,18 @@ impl Systematic {
         });
         let rho = fitted.neighbours;
         let factor = ((1.0 + rho) / (1.0 - rho).max(1e-3)).sqrt();
-        let factor = match self.follow[0] {
+        let factor = match first {
             Follow::Correlation(_) => {
                 format!(", by a factor of about {factor:.1} as far as this curve counts")
             }
             _ => String::new(),
         };
-        words.push(format!(
+        Some(format!(
             "{test}, {y}: residuals follow each other ({}), {}: that is no noise but a systematic error, what the law does not \
              follow, or points that were measured too densely; the intervals are too narrow{factor}",
             how.collect::<Vec<_>>().join("; "),
             self.stretch(fitted)
-        ));
-        words
+        ))
     }
 
     /// The longest stretch of points of one sign; of those too far off if these are what follows.

@@ -72,16 +72,7 @@ where
     ) -> Result<Self, Error> {
         let path = folder.join(name);
         let unwritable = |source| text::Error::unwritable(&path, source);
-        // Nothing is written through a link.
-        let is_plain = path.symlink_metadata().is_ok_and(|found| found.is_file());
-        let mut file = if is_plain {
-            let mut options = File::options();
-            options.read(true).write(true).open(&path)
-        } else {
-            std::fs::create_dir_all(folder).map_err(unwritable)?;
-            begin(&path)
-        }
-        .map_err(unwritable)?;
+        let mut file = open(folder, &path).map_err(unwritable)?;
         if let Err(TryLockError::WouldBlock) = file.try_lock() {
             let message = format!("{}: another process {doing} there", folder.display());
             return Err(Error::usage(message));
@@ -169,6 +160,16 @@ where
     let head: Head = serde_json::from_slice(lines.next()?).ok()?;
     let lines = lines.filter_map(|line| serde_json::from_slice(line).ok());
     (head.belongs_to == identity).then(|| lines.collect())
+}
+
+/// Opens a file to read and write it. Nothing is written through a link.
+fn open(folder: &Path, path: &Path) -> std::io::Result<File> {
+    let is_plain = path.symlink_metadata().is_ok_and(|found| found.is_file());
+    if is_plain {
+        return File::options().read(true).write(true).open(path);
+    }
+    std::fs::create_dir_all(folder)?;
+    begin(path)
 }
 
 #[cfg(test)]

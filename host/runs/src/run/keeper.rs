@@ -32,8 +32,11 @@ impl Keeper {
         }
     }
 
-    /// Content of the folder's checkpoint, if it exists.
+    /// Content of the folder's checkpoint, if it exists and the run is to go on from it.
     pub(super) fn found(&self) -> Result<Option<Checkpoint<'static>>, text::Error> {
+        if !self.options.resume {
+            return Ok(None);
+        }
         Checkpoint::read(&self.folder, &self.identity)
     }
 

@@ -5,7 +5,7 @@ use super::{Plan, folder_of_run, is_wanted};
 use crate::{Error, supervision};
 use law::{Stop, Stopped};
 use results::report::Running;
-use results::study::{Row, Standing, State, standing, take_table};
+use results::study::{Record, Row, Standing, State, standing, take_table};
 use std::collections::VecDeque;
 use std::ffi::OsString;
 use std::io::Read as _;
@@ -90,44 +90,7 @@ pub fn carry_out(
         queue: Mutex::new(queue),
         inputs: (0..n_workers).map(|_| Mutex::default()).collect(),
     };
-    let (sender, receiver) = channel();
-    let written = std::thread::scope(|scope| {
-        for worker in 0..n_workers {
-            let (pool, sender) = (&pool, sender.clone());
-            scope.spawn(move || pool.work(worker, &sender));
-        }
-        drop(sender);
-        let mut last = Instant::now();
-        let mut report = Running::new(&plan.folder);
-        let mut written = Ok(());
-        loop {
-            match receiver.recv_timeout(PAUSE) {
-                Ok(Message::Begun(index)) => {
-                    rows[index - 1].standing = Standing::plain(State::Running);
-                }
-                Ok(Message::Ended(index, standing)) => {
-                    let ended = Event::Ended {
-                        index,
-                        standing: standing.clone(),
-                    };
-                    record.note(&plan.folder, &mut rows[index - 1], standing);
-                    watch(&ended);
-                }
-                Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => break,
-            }
-            if stop.is_asked() || written.is_err() {
-                pool.stop();
-            }
-            if last.elapsed() >= TABLE_EVERY && written.is_ok() {
-                written = record.write_table(&plan.folder, &rows);
-                // What cannot be shown now is said by the report at the end.
-                let _ = report.write_if_due();
-                last = Instant::now();
-            }
-        }
-        written
-    });
+    let written = pool.follow(&record, &mut rows, stop, watch);
     supervision::end_run();
     written?;
     record.write_table(&plan.folder, &rows)?;
@@ -162,6 +125,58 @@ struct Pool<'p> {
 }
 
 impl Pool<'_> {
+    /// Has the workers carry out all runs, and keeps `rows` and their table up to date.
+    ///
+    /// # Errors
+    /// The table cannot be written.
+    fn follow(
+        &self,
+        record: &Record,
+        rows: &mut [Row],
+        stop: &Stop,
+        watch: &mut dyn FnMut(&Event),
+    ) -> Result<(), text::Error> {
+        let folder = &self.plan.folder;
+        let (sender, receiver) = channel();
+        std::thread::scope(|scope| {
+            for worker in 0..self.inputs.len() {
+                let sender = sender.clone();
+                scope.spawn(move || self.work(worker, &sender));
+            }
+            drop(sender);
+            let mut last = Instant::now();
+            let mut report = Running::new(folder);
+            let mut written = Ok(());
+            loop {
+                match receiver.recv_timeout(PAUSE) {
+                    Ok(Message::Begun(index)) => {
+                        rows[index - 1].standing = Standing::plain(State::Running);
+                    }
+                    Ok(Message::Ended(index, standing)) => {
+                        let ended = Event::Ended {
+                            index,
+                            standing: standing.clone(),
+                        };
+                        record.note(folder, &mut rows[index - 1], standing);
+                        watch(&ended);
+                    }
+                    Err(RecvTimeoutError::Timeout) => {}
+                    Err(RecvTimeoutError::Disconnected) => break,
+                }
+                if stop.is_asked() || written.is_err() {
+                    self.stop();
+                }
+                if last.elapsed() >= TABLE_EVERY && written.is_ok() {
+                    written = record.write_table(folder, rows);
+                    // What cannot be shown now is said by the report at the end.
+                    let _ = report.write_if_due();
+                    last = Instant::now();
+                }
+            }
+            written
+        })
+    }
+
     /// Takes run after run. The thread that starts a process has to outlive it: the process ends with it.
     fn work(&self, worker: usize, sender: &Sender<Message>) {
         while let Some(index) = self.next() {

@@ -1,7 +1,7 @@
 //! One run of a study, in a separate process.
 
 use super::{Plan, folder_of_run, is_wanted, other_file, other_run};
-use crate::run::{Observer, Options, ready};
+use crate::run::{Observer, Options, Ready, ready};
 use crate::{Error, ending, supervision, trade_off};
 use input::{Case, Kind};
 use law::Stop;
@@ -76,6 +76,45 @@ pub struct Once {
     pub checkpoints: Duration,
 }
 
+impl Once {
+    fn options(&self, plan: &Plan) -> Options {
+        Options {
+            resume: true,
+            checkpoints: Some(self.checkpoints),
+            // What is left of a run that is done is in its record.
+            ends_without: true,
+            reports: plan.study.file.reports,
+        }
+    }
+}
+
+/// Plans the study before its run, unless that is done already or is the work of another process.
+fn make_plan(plan: &Plan, index: usize, case: &Case, anew: bool) -> Result<(), Error> {
+    if is_worker() || is_planned(plan, case)? {
+        return Ok(());
+    }
+    let record = plan.check()?;
+    let _table = wait_for_table(&plan.folder)?;
+    // Whoever had it until now may have made the plan.
+    if !is_planned(plan, case)? {
+        plan.prepare_beside(&record, anew.then_some(index))?;
+    }
+    Ok(())
+}
+
+/// Refuses to go on with a run that was begun as another one, or with files changed since the study was begun.
+fn refuse_changed(plan: &Plan, folder: &Path, ready: &Ready<'_>) -> Result<(), Error> {
+    let earlier = identity_of_run(folder).filter(|identity| !identity.is_empty());
+    if earlier.is_some_and(|earlier| earlier != ready.identity()) {
+        return Err(other_run(folder));
+    }
+    // Since the study was begun, or by another process in this moment.
+    match Record::read(&plan.folder)?.changed(ready.files()) {
+        Some(name) => Err(other_file(&plan.folder, &name)),
+        None => Ok(()),
+    }
+}
+
 /// Carries out one run, unless it is done already; goes on from where it was stopped. Returns whether there
 /// was anything to do.
 ///
@@ -89,16 +128,8 @@ pub fn run_one(
     observer: &mut dyn Observer,
     say: &mut dyn FnMut(&str),
 ) -> Result<bool, Error> {
-    let values = plan.values(index)?;
-    let case = plan.case(values)?;
-    if !is_worker() && !is_planned(plan, &case)? {
-        let record = plan.check()?;
-        let _table = wait_for_table(&plan.folder)?;
-        // Whoever had it until now may have made the plan.
-        if !is_planned(plan, &case)? {
-            plan.prepare_beside(&record, once.anew.then_some(index))?;
-        }
-    }
+    let case = plan.case(plan.values(index)?)?;
+    make_plan(plan, index, &case, once.anew)?;
     let folder = plan.folder.join(folder_of_run(index));
     let Some(mut held) = Held::take(&folder)? else {
         let message = format!("run {index} is being carried out by another process");
@@ -123,29 +154,15 @@ pub fn run_one(
         let studied = trade_off::reach_until(&case, (&folder, true), &stop, say)?;
         let case = studied.as_ref().unwrap_or(&case);
         let ready = ready(case)?;
-        let earlier = identity_of_run(&folder).filter(|identity| !identity.is_empty());
-        if earlier.is_some_and(|earlier| earlier != ready.identity()) {
-            return Err(other_run(&folder));
-        }
-        // Since the study was begun, or by another process in this moment.
-        if let Some(name) = Record::read(&plan.folder)?.changed(ready.files()) {
-            return Err(other_file(&plan.folder, &name));
-        }
+        refuse_changed(plan, &folder, &ready)?;
         if !is_wanted(&before, true) {
             return Ok(false);
         }
         held.begin(ready.identity())?;
         may_end = true;
-        let options = Options {
-            resume: true,
-            checkpoints: Some(once.checkpoints),
-            // What is left of a run that is done is in its record.
-            ends_without: true,
-            reports: plan.study.file.reports,
-        };
         let mut reuse = Reuse::default();
         reuse.is_last_run = true;
-        ready.run(&folder, observer, &mut reuse, options)?;
+        ready.run(&folder, observer, &mut reuse, once.options(plan))?;
         Ok(true)
     })();
     supervision::end_run();
@@ -153,6 +170,17 @@ pub fn run_one(
     if !may_end || matches!(outcome, Ok(false)) {
         return outcome;
     }
+    end(plan, index, &mut held, outcome)
+}
+
+/// Notes what a run ended with, and writes its report.
+fn end(
+    plan: &Plan,
+    index: usize,
+    held: &mut Held,
+    outcome: Result<bool, Error>,
+) -> Result<bool, Error> {
+    let folder = plan.folder.join(folder_of_run(index));
     let standing = standing_after(outcome.as_ref().err());
     held.end(&standing)?;
     if standing.state == State::Done {

@@ -24,7 +24,7 @@ use mechanics::equilibrium::Reuse;
 use results::Figures;
 use search::Search;
 use std::path::Path;
-use table::Table;
+use toml::Spanned;
 
 /// Share of the target for increments and tolerance where the mesh has the rest.
 const WITHOUT_MESH: f64 = 0.5;
@@ -87,12 +87,7 @@ pub fn reach_until(
     let Some(accuracy) = &case.file.accuracy else {
         return Ok(None);
     };
-    crate::run::check(case)?;
-    if case.file.probes.is_empty() && case.file.pile.is_none() {
-        let message =
-            "`accuracy` is the error of the [probes] and of the [pile], and there are none";
-        return Err(case.source.error(accuracy.span(), message).into());
-    }
+    check(case, accuracy)?;
     if !resume {
         results::make_way(folder)?;
     }
@@ -100,18 +95,8 @@ pub fn reach_until(
     let asked = *accuracy.get_ref();
     let with_mesh = case.file.accuracy_with_mesh.as_ref();
     let with_mesh = with_mesh.is_some_and(|with| *with.get_ref());
-    let mut search = Search {
-        trials: &trials,
-        asked: if with_mesh {
-            WITHOUT_MESH * asked
-        } else {
-            asked
-        },
-        runs: 0,
-        table: Table::begin(folder)?,
-        failed: Vec::new(),
-        say,
-    };
+    let share = if with_mesh { WITHOUT_MESH } else { 1.0 };
+    let mut search = Search::new(&trials, share * asked, folder, say)?;
     let (settings, found) = search.best()?;
     // What a looser tolerance does on one mesh says little about a finer one.
     let (settings, without_mesh, mesh) = if with_mesh {
@@ -126,11 +111,7 @@ pub fn reach_until(
     let reached = without_mesh.zip(of_mesh).map(|(a, b)| a + b);
     let verdict = Verdict::of(reached, asked);
     let mut chosen = settings.apply(case)?;
-    let phases = chosen.file.phases.iter();
-    let increments = phases.map(|phase| {
-        let name = phase.name.get_ref().clone();
-        (name, *phase.increments.get_ref())
-    });
+    let solver = chosen.file.solver.get_ref();
     chosen.file.chosen = Some(AccuracySettings {
         asked,
         reached,
@@ -143,9 +124,9 @@ pub fn reach_until(
         failed: search.failed,
         estimate: found.estimate,
         cut_back: found.cut_back,
-        increments: increments.collect(),
-        force_tolerance: chosen.file.solver.get_ref().force_tolerance,
-        displacement_tolerance: chosen.file.solver.get_ref().displacement_tolerance,
+        increments: increments(&chosen),
+        force_tolerance: solver.force_tolerance,
+        displacement_tolerance: solver.displacement_tolerance,
         parameters: settings.law.iter().flat_map(parameters).collect(),
         zero: found.trial.rows.zero(),
         runs: search.runs,
@@ -165,4 +146,25 @@ fn parameters((law, values, _): &(String, Values, String)) -> Vec<String> {
         format!("{law}.{id} = {value}")
     };
     values.iter().map(written).collect()
+}
+
+/// Checks all that can be without a run, and that there is something whose error `accuracy` may be.
+fn check(case: &Case, accuracy: &Spanned<f64>) -> Result<(), Error> {
+    crate::run::check(case)?;
+    if case.file.probes.is_empty() && case.file.pile.is_none() {
+        let message =
+            "`accuracy` is the error of the [probes] and of the [pile], and there are none";
+        return Err(case.source.error(accuracy.span(), message).into());
+    }
+    Ok(())
+}
+
+/// The increments of all phases, by name.
+fn increments(case: &Case) -> Vec<(String, usize)> {
+    let phases = case.file.phases.iter();
+    let increments = phases.map(|phase| {
+        let name = phase.name.get_ref().clone();
+        (name, *phase.increments.get_ref())
+    });
+    increments.collect()
 }

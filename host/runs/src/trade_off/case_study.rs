@@ -77,68 +77,33 @@ pub(super) fn study(
     (fine, thorough): (bool, bool),
     (done, say): (&mut Done<'_>, &mut dyn FnMut(&str)),
 ) -> Result<(), Error> {
-    let case = trials.case;
-    refuse_without_probes(case, "there is nothing to measure the error of")?;
-    let mut cases = Cases {
-        trials,
-        say,
-        plan: &WHOLE,
-        expected: Expected::default(),
-        unit: 1.0,
-        left: Vec::new(),
-    };
+    refuse_without_probes(trials.case, "there is nothing to measure the error of")?;
+    let mut cases = Cases::new(trials, say);
     let default = cases.run(&Settings::default(), Timing::Repeated, 0)?;
     // Counted in runs with the file's settings; that one was repeated.
     cases.unit = default.seconds;
     study.columns.clone_from(&default.rows.names);
+    let largest = default.rows.largest();
     study.rows.push(Row {
         family: "as in the file".to_owned(),
         label: "as in the file".to_owned(),
         is_default: true,
         reference: 0,
-        outcome: Ok(measurement(
-            &default,
-            &default.rows,
-            &default.rows.largest(),
-        )),
+        outcome: Ok(measurement(&default, &default.rows, &largest)),
     });
     done(study)?;
     if cases.unit > LONG && !thorough {
-        cases.plan = &SHORT;
-        let note = format!(
-            "a run takes {}: a shorter study, without the schemes of the laws, of one round; \
-             --thorough tries everything",
-            in_words(cases.unit)
-        );
-        (cases.say)(&note);
-        study.notes.push(note);
+        study.notes.push(cases.shorten());
     }
     let divisions: &[usize] = if fine { &[2, 4] } else { &[2] };
-    for factor in cases.plan.reference_factors {
-        cases.expect(&cases.tight().with_increments(factor), Timing::Once);
-    }
-    for &division in divisions {
-        cases.expect(&Settings::default().divided(division), Timing::Repeated);
-    }
-    let laws = if cases.plan.schemes {
-        (cases.say)("which schemes of the laws there are");
-        law_schemes(trials)?
-    } else {
-        Vec::new()
-    };
-    let settings = settings_on_this_mesh(case, &laws, cases.plan)?;
-    for (_, settings) in &settings {
-        cases.expect(settings, Timing::Repeated);
-        for _ in 0..cases.plan.more_rounds {
-            cases.expect(settings, Timing::Once);
-        }
-    }
+    let laws = cases.schemes()?;
+    let settings = settings_on_this_mesh(trials.case, &laws, cases.plan)?;
+    cases.expect_all(divisions, &settings);
     let (mut reference, path) = cases.path_reference(&laws)?;
     let mut scale = path.rows.largest();
     let zero = path.rows.zero();
-    study
-        .notes
-        .extend((!zero.is_empty()).then(|| messages::zero(&zero)));
+    let of_zero = (!zero.is_empty()).then(|| messages::zero(&zero));
+    study.notes.extend(of_zero);
     study.notes.extend(path.leave_out_round_off(&mut scale));
     reference.convergence = path.convergence(&scale);
     study.references.push(reference);
@@ -149,18 +114,10 @@ pub(super) fn study(
     let mut timed = vec![(0, Settings::default())];
     for (family, settings) in settings {
         timed.push((study.rows.len(), settings.clone()));
-        let row = cases.row(family, &settings, 0, &path.rows, &scale)?;
-        study.rows.push(row);
-        study.judge();
-        done(study)?;
+        let row = cases.row(family, &settings, 0, (&path.rows, &scale))?;
+        study.show(row, done)?;
     }
-    let seconds = cases.more_rounds(study, &timed)?.unwrap_or(default.seconds);
-    let defaults = study.rows.iter_mut().filter(|row| row.is_default);
-    for measured in defaults.filter_map(|row| row.outcome.as_mut().ok()) {
-        measured.seconds = seconds;
-    }
-    study.judge();
-    Ok(())
+    cases.more_rounds(study, &timed, default.seconds)
 }
 
 /// Refuses a case whose history has nothing but its increments.
@@ -219,6 +176,13 @@ fn settings_on_this_mesh(
     Ok(all)
 }
 
+fn label_of_mesh(settings: &Settings) -> String {
+    match settings.division {
+        1 => "the file's mesh".to_owned(),
+        _ => settings.label(),
+    }
+}
+
 fn measurement(trial: &Trial, reference: &Rows, scale: &[f64]) -> Measurement {
     let errors = trial.rows.differences(reference, scale);
     Measurement::new(trial.seconds, trial.counts.all(), errors)
@@ -253,6 +217,9 @@ impl Finest {
     }
 }
 
+/// A run with these settings, or why there is none.
+type Divided = (Settings, Result<Trial, Error>);
+
 struct Cases<'a> {
     trials: &'a Trials<'a>,
     say: &'a mut dyn FnMut(&str),
@@ -264,7 +231,27 @@ struct Cases<'a> {
     left: Vec<(Settings, Timing)>,
 }
 
-impl Cases<'_> {
+impl<'a> Cases<'a> {
+    fn new(trials: &'a Trials<'a>, say: &'a mut dyn FnMut(&str)) -> Self {
+        Self {
+            trials,
+            say,
+            plan: &WHOLE,
+            expected: Expected::default(),
+            unit: 1.0,
+            left: Vec::new(),
+        }
+    }
+
+    /// Schemes of the laws, where they are looked for.
+    fn schemes(&mut self) -> Result<Vec<(String, Scheme)>, Error> {
+        if !self.plan.schemes {
+            return Ok(Vec::new());
+        }
+        (self.say)("which schemes of the laws there are");
+        law_schemes(self.trials)
+    }
+
     fn run(&mut self, settings: &Settings, timing: Timing, round: usize) -> Result<Trial, Error> {
         if let Some(next) = self.left.iter().position(|(of, _)| of == settings) {
             self.left.remove(next);
@@ -312,8 +299,37 @@ impl Cases<'_> {
         Timing::Within(Duration::from_secs_f64(times * self.unit))
     }
 
+    /// Takes the shorter plan. Returns the note that says so.
+    fn shorten(&mut self) -> String {
+        self.plan = &SHORT;
+        let note = format!(
+            "a run takes {}: a shorter study, without the schemes of the laws, of one round; \
+             --thorough tries everything",
+            in_words(self.unit)
+        );
+        (self.say)(&note);
+        note
+    }
+
     fn expect(&mut self, settings: &Settings, timing: Timing) {
         self.left.push((settings.clone(), timing));
+    }
+
+    /// Notes the work that is left: the reference, divided meshes, and settings by family.
+    fn expect_all(&mut self, divisions: &[usize], settings: &[(String, Settings)]) {
+        let tight = self.tight();
+        for factor in self.plan.reference_factors {
+            self.expect(&tight.clone().with_increments(factor), Timing::Once);
+        }
+        for &division in divisions {
+            self.expect(&Settings::default().divided(division), Timing::Repeated);
+        }
+        for (_, settings) in settings {
+            self.expect(settings, Timing::Repeated);
+            for _ in 0..self.plan.more_rounds {
+                self.expect(settings, Timing::Once);
+            }
+        }
     }
 
     /// The file's settings with the tolerance of the reference.
@@ -327,8 +343,7 @@ impl Cases<'_> {
         family: String,
         settings: &Settings,
         number: usize,
-        reference: &Rows,
-        scale: &[f64],
+        (reference, scale): (&Rows, &[f64]),
     ) -> Result<Row, Error> {
         let outcome = self.run(settings, Timing::Repeated, 0);
         self.trials.stop.check("the study")?;
@@ -342,12 +357,14 @@ impl Cases<'_> {
         })
     }
 
-    /// Times settings, by the number of their row, in all rounds after the first. Returns the seconds of the first row.
+    /// Times settings, by the number of their row, in all rounds after the first. The file's settings take the seconds
+    /// of the first row, or `seconds`, in all their rows.
     fn more_rounds(
         &mut self,
         study: &mut Study,
         timed: &[(usize, Settings)],
-    ) -> Result<Option<f64>, Error> {
+        seconds: f64,
+    ) -> Result<(), Error> {
         for round in 1..=self.plan.more_rounds {
             for (number, settings) in timed {
                 if let Ok(measured) = &mut study.rows[*number].outcome {
@@ -357,7 +374,13 @@ impl Cases<'_> {
             }
         }
         let first = study.rows[0].outcome.as_ref();
-        Ok(first.ok().map(|measured| measured.seconds))
+        let seconds = first.map_or(seconds, |measured| measured.seconds);
+        let defaults = study.rows.iter_mut().filter(|row| row.is_default);
+        for measured in defaults.filter_map(|row| row.outcome.as_mut().ok()) {
+            measured.seconds = seconds;
+        }
+        study.judge();
+        Ok(())
     }
 
     /// The finest run on the file's mesh: many increments, a tight tolerance, and the scheme that
@@ -414,6 +437,18 @@ impl Cases<'_> {
         self.run(&settings, Timing::Once, 0)
     }
 
+    /// Runs on the file's mesh and on divided ones.
+    fn divided(&mut self, default: &Trial, divisions: &[usize]) -> Result<Vec<Divided>, Error> {
+        let mut trials = vec![(Settings::default(), Ok(default.clone()))];
+        for &division in divisions {
+            let settings = Settings::default().divided(division);
+            let run = self.run(&settings, Timing::Repeated, 0);
+            self.trials.stop.check("the study")?;
+            trials.push((settings, run));
+        }
+        Ok(trials)
+    }
+
     /// Divided meshes, and other integrations of thin layers, against the finest mesh.
     fn meshes(
         &mut self,
@@ -423,36 +458,27 @@ impl Cases<'_> {
         divisions: &[usize],
         done: &mut Done<'_>,
     ) -> Result<(), Error> {
-        let mut trials = vec![(Settings::default(), Ok(default.clone()))];
-        for &division in divisions {
-            let settings = Settings::default().divided(division);
-            let run = self.run(&settings, Timing::Repeated, 0);
-            self.trials.stop.check("the study")?;
-            trials.push((settings, run));
-        }
-        let ran: Vec<(&Settings, &Trial)> = trials
+        let trials = self.divided(default, divisions)?;
+        let ran = trials
             .iter()
-            .filter_map(|(settings, run)| Some((settings, run.as_ref().ok()?)))
-            .collect();
+            .filter_map(|(of, run)| Some((of, run.as_ref().ok()?)));
+        let ran: Vec<(&Settings, &Trial)> = ran.collect();
         let [.., (next, before), (finest, reference)] = ran.as_slice() else {
-            for (settings, run) in &trials {
-                if let Err(error) = run {
-                    let why = in_one_line(error);
-                    study.notes.push(format!("{}: {why}", settings.label()));
-                }
-            }
+            let failed = trials
+                .iter()
+                .filter_map(|(of, run)| Some((of, run.as_ref().err()?)));
+            let note = |(of, error): (&Settings, &Error)| {
+                format!("{}: {}", of.label(), in_one_line(error))
+            };
+            study.notes.extend(failed.map(note));
             return Ok(());
-        };
-        let label = |settings: &Settings| match settings.division {
-            1 => "the file's mesh".to_owned(),
-            _ => settings.label(),
         };
         let rows = reference.rows.clone();
         let coarse = ran.len().checked_sub(3).map(|i| ran[i].1);
         let number = study.references.len();
         study.references.push(Reference {
             label: finest.label(),
-            next: label(next),
+            next: label_of_mesh(next),
             convergence: Convergence::of(
                 coarse.map(|coarse| coarse.rows.difference(&before.rows, scale)),
                 before.rows.difference(&rows, scale),
@@ -463,7 +489,7 @@ impl Cases<'_> {
             let outcome = run.as_ref().map(|trial| measurement(trial, &rows, scale));
             study.rows.push(Row {
                 family: "mesh".to_owned(),
-                label: label(settings),
+                label: label_of_mesh(settings),
                 is_default: settings.division == 1,
                 reference: number,
                 outcome: outcome.map_err(in_one_line),
@@ -471,17 +497,26 @@ impl Cases<'_> {
         }
         study.judge();
         done(study)?;
-        for settings in self.integrations() {
-            let row = self.row("integration".to_owned(), &settings, number, &rows, scale)?;
-            study.rows.push(row);
-            study.judge();
-            done(study)?;
+        self.integrations(study, number, (&rows, scale), done)
+    }
+
+    /// Other integrations of thin layers, against the reference of this number.
+    fn integrations(
+        &mut self,
+        study: &mut Study,
+        number: usize,
+        reference: (&Rows, &[f64]),
+        done: &mut Done<'_>,
+    ) -> Result<(), Error> {
+        for settings in self.other_integrations() {
+            let row = self.row("integration".to_owned(), &settings, number, reference)?;
+            study.show(row, done)?;
         }
         Ok(())
     }
 
     /// Integrations of thin layers that no layer has in the file.
-    fn integrations(&self) -> Vec<Settings> {
+    fn other_integrations(&self) -> Vec<Settings> {
         let groups = self.trials.case.file.groups.values();
         let groups = groups.map(toml::Spanned::get_ref);
         let layers = groups.filter(|group| group.formulation == Formulation::ThinLayer);

@@ -1,8 +1,10 @@
 //! The work–precision diagram: error over cost, both logarithmic, as SVG.
 
 use super::study::{Measurement, Row, Study};
+use plotters::coord::combinators::LogCoord;
 use plotters::prelude::*;
 use results::figure::COLOURS;
+use std::ops::Range;
 
 /// Size of the diagram in points, and of the legend next to it.
 const SIZE: (u32, u32) = (620, 440);
@@ -11,6 +13,8 @@ const LINE: i32 = 17;
 const LEAST_ERROR: f64 = 1e-14;
 
 type Failure = DrawingAreaErrorKind<std::io::Error>;
+type Chart<'d, 'b> = ChartContext<'d, SVGBackend<'b>, Cartesian2d<LogCoord<f64>, LogCoord<f64>>>;
+
 impl Study {
     /// The diagram.
     ///
@@ -30,32 +34,23 @@ fn place(study: &Study, row: &Row, measured: &Measurement) -> (f64, f64) {
     (measured.seconds, error)
 }
 
-fn draw(text: &mut String, study: &Study) -> Result<(), Failure> {
-    let measured: Vec<(&Row, &Measurement)> = (0..study.references.len())
-        .flat_map(|number| study.measured(number))
-        .collect();
-    let mut families: Vec<&str> = Vec::new();
-    for (row, _) in &measured {
-        if !families.contains(&row.family.as_str()) {
-            families.push(&row.family);
-        }
-    }
-    let places: Vec<(f64, f64)> = measured
-        .iter()
-        .map(|(row, m)| place(study, row, m))
-        .collect();
-    let x = decades(places.iter().map(|p| p.0));
-    let y = decades(places.iter().map(|p| p.1));
-    let longest = families.iter().map(|f| f.chars().count()).max();
-    let beside = 40 + 7 * longest.unwrap_or(0).max(24) as u32;
-    let area = SVGBackend::with_string(text, (SIZE.0 + beside, SIZE.1)).into_drawing_area();
-    area.fill(&WHITE)?;
-    let (left, right) = area.split_horizontally(SIZE.0);
-    let mut chart = ChartBuilder::on(&left)
-        .caption(
-            format!("{}: error and cost", study.name),
-            ("sans-serif", 15),
-        )
+/// What nothing beats, from cheap to dear.
+fn front(study: &Study) -> Vec<(f64, f64)> {
+    let optimal = study.measured(0).filter(|(_, m)| m.is_optimal);
+    let mut front: Vec<_> = optimal.map(|(row, m)| place(study, row, m)).collect();
+    front.sort_by(|a, b| a.0.total_cmp(&b.0));
+    front
+}
+
+/// The axes: cost to the right, error upward.
+fn axes<'d, 'b>(
+    area: &'d DrawingArea<SVGBackend<'b>, plotters::coord::Shift>,
+    title: &str,
+    x: &Range<f64>,
+    y: &Range<f64>,
+) -> Result<Chart<'d, 'b>, Failure> {
+    let mut chart = ChartBuilder::on(area)
+        .caption(title, ("sans-serif", 15))
         .margin(12)
         .x_label_area_size(40)
         .y_label_area_size(62)
@@ -71,6 +66,29 @@ fn draw(text: &mut String, study: &Study) -> Result<(), Failure> {
         .axis_desc_style(("sans-serif", 14))
         .label_style(("sans-serif", 12))
         .draw()?;
+    Ok(chart)
+}
+
+fn draw(text: &mut String, study: &Study) -> Result<(), Failure> {
+    let measured: Vec<(&Row, &Measurement)> = (0..study.references.len())
+        .flat_map(|number| study.measured(number))
+        .collect();
+    let mut families: Vec<&str> = Vec::new();
+    for (row, _) in &measured {
+        if !families.contains(&row.family.as_str()) {
+            families.push(&row.family);
+        }
+    }
+    let places = measured.iter().map(|(row, m)| place(study, row, m));
+    let places: Vec<(f64, f64)> = places.collect();
+    let x = decades(places.iter().map(|p| p.0));
+    let y = decades(places.iter().map(|p| p.1));
+    let longest = families.iter().map(|f| f.chars().count()).max();
+    let beside = 40 + 7 * longest.unwrap_or(0).max(24) as u32;
+    let area = SVGBackend::with_string(text, (SIZE.0 + beside, SIZE.1)).into_drawing_area();
+    area.fill(&WHITE)?;
+    let (left, right) = area.split_horizontally(SIZE.0);
+    let mut chart = axes(&left, &format!("{}: error and cost", study.name), &x, &y)?;
     let floor = study.references[0].convergence.uncertainty.max(LEAST_ERROR);
     let grey = BLACK.mix(0.45);
     if floor > y.start {
@@ -81,13 +99,8 @@ fn draw(text: &mut String, study: &Study) -> Result<(), Failure> {
             grey.stroke_width(1),
         ))?;
     }
-    let mut front: Vec<(f64, f64)> = study
-        .measured(0)
-        .filter(|(_, m)| m.is_optimal)
-        .map(|(row, m)| place(study, row, m))
-        .collect();
-    front.sort_by(|a, b| a.0.total_cmp(&b.0));
-    chart.draw_series(LineSeries::new(front, BLACK.stroke_width(1)))?;
+    let front = LineSeries::new(front(study), BLACK.stroke_width(1));
+    chart.draw_series(front)?;
     let colours: Vec<RGBColor> = COLOURS.into_iter().cycle().take(families.len()).collect();
     for ((row, _), at) in measured.iter().zip(&places) {
         let family = families.iter().position(|f| *f == row.family).unwrap_or(0);
@@ -142,7 +155,7 @@ fn power(value: f64) -> String {
 }
 
 /// Whole decades around some values.
-fn decades(values: impl Iterator<Item = f64>) -> std::ops::Range<f64> {
+fn decades(values: impl Iterator<Item = f64>) -> Range<f64> {
     let logarithms = values.map(f64::log10).filter(|v| v.is_finite());
     let (low, high) = logarithms.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
         (low.min(v), high.max(v))

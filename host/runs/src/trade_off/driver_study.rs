@@ -1,6 +1,6 @@
 //! The study of a driver: increments per segment × integration scheme of the law.
 
-use super::scheme::{Scheme, schemes};
+use super::scheme::{Scheme, Values, schemes};
 use super::study::{Done, Measurement, ROWS, Reference, Row, Study};
 use crate::Error;
 use crate::experiment::Rows;
@@ -29,19 +29,7 @@ pub(super) fn study(
     let n_segments = driver.point().segment_increments().len();
     // The file's own setting has to run, whatever becomes of the others.
     follow(driver)?;
-    let schemes = schemes(
-        driver.point().law().description(),
-        |id| driver.point().parameter(id),
-        |a, b| {
-            let run = |values| {
-                let mut driver = driver.with_parameters(values).ok()?;
-                driver.point_mut().set_increments(&vec![FEW; n_segments]);
-                follow(&driver).ok().map(|(rows, _)| rows)
-            };
-            run(a) != run(b)
-        },
-    );
-    let mut drivers = schemes
+    let mut drivers = schemes_of(driver)
         .into_iter()
         .map(|scheme| Ok((driver.with_parameters(&scheme.values)?, scheme)))
         .collect::<Result<Vec<_>, Error>>()?;
@@ -53,14 +41,7 @@ pub(super) fn study(
     study.references.push(found.reference);
     study.notes = found.notes;
     let own = driver.point().segment_increments();
-    let mut plan: Vec<(usize, Vec<usize>)> = Vec::new();
-    for (number, (_, scheme)) in drivers.iter().enumerate() {
-        let counts = INCREMENTS.into_iter().filter(|n| *n <= most);
-        let counts = counts.map(|n| vec![n; n_segments]);
-        let has_own = counts.clone().any(|increments| increments == own);
-        let added = (scheme.is_default && !has_own).then(|| own.clone());
-        plan.extend(counts.chain(added).map(|increments| (number, increments)));
-    }
+    let plan = matrix(&drivers, &own, most);
     // What does not depend on the increments is as long as some of them.
     let weight = |increments: &[usize]| 100.0 + increments.iter().sum::<usize>() as f64;
     let mut pace = Pace::new(plan.iter().map(|(_, increments)| weight(increments)).sum());
@@ -71,17 +52,45 @@ pub(super) fn study(
         let outcome = measure(driver, &found.rows, &found.scale);
         stop.check("the study")?;
         pace.did(weight(&increments));
-        study.rows.push(Row {
+        let row = Row {
             family: family(scheme),
             label: label(scheme, &increments),
             is_default: scheme.is_default && increments == own,
             reference: 0,
             outcome: outcome.map_err(|error| in_one_line(&error)),
-        });
-        study.judge();
-        done(study)?;
+        };
+        study.show(row, done)?;
     }
     Ok(())
+}
+
+/// Schemes of the driver's law.
+fn schemes_of(driver: &Driver) -> Vec<Scheme> {
+    let n_segments = driver.point().segment_increments().len();
+    let run = |values: &Values| {
+        let mut driver = driver.with_parameters(values).ok()?;
+        driver.point_mut().set_increments(&vec![FEW; n_segments]);
+        follow(&driver).ok().map(|(rows, _)| rows)
+    };
+    schemes(
+        driver.point().law().description(),
+        |id| driver.point().parameter(id),
+        |a, b| run(a) != run(b),
+    )
+}
+
+/// All to be measured: a scheme by its number, and increments by segment. The file's own, `own`, are among those of its
+/// scheme.
+fn matrix(drivers: &[(Driver, Scheme)], own: &[usize], most: usize) -> Vec<(usize, Vec<usize>)> {
+    let mut all = Vec::new();
+    for (number, (_, scheme)) in drivers.iter().enumerate() {
+        let counts = INCREMENTS.into_iter().filter(|n| *n <= most);
+        let counts = counts.map(|n| vec![n; own.len()]);
+        let has_own = counts.clone().any(|increments| increments == own);
+        let added = (scheme.is_default && !has_own).then(|| own.to_vec());
+        all.extend(counts.chain(added).map(|increments| (number, increments)));
+    }
+    all
 }
 
 struct Found {

@@ -40,6 +40,17 @@ impl Scheme {
     }
 }
 
+impl Scheme {
+    /// That of a law without a choice.
+    fn only() -> Self {
+        Self {
+            is_default: true,
+            is_finest: true,
+            ..Self::default()
+        }
+    }
+}
+
 /// The schemes of a law. `current` gives the value of a parameter in the file, `differ` says
 /// whether two sets of values lead to different results.
 pub(super) fn schemes(
@@ -50,25 +61,19 @@ pub(super) fn schemes(
     let declared = |id: &str| law.parameters.iter().find(|p| p.id == id);
     let choices = declared(SCHEME).map_or(&[][..], |p| &p.choices);
     if choices.is_empty() {
-        return vec![Scheme {
-            is_default: true,
-            is_finest: true,
-            ..Scheme::default()
-        }];
+        return vec![Scheme::only()];
     }
     let mut schemes = Vec::new();
     for (index, choice) in choices.iter().enumerate() {
         let chosen = (SCHEME.to_owned(), ParameterValue::Label(choice.clone()));
         let is_current = current(SCHEME).is_some_and(|v| v.total_cmp(&(index as f64)).is_eq());
         let with = |id: &str, value: f64| -> Values {
-            vec![
-                chosen.clone(),
-                (id.to_owned(), ParameterValue::Number(value)),
-            ]
+            let control = (id.to_owned(), ParameterValue::Number(value));
+            vec![chosen.clone(), control]
         };
+        let is_number = |id: &str| declared(id).is_some_and(|p| p.choices.is_empty());
         let control = CONTROLS.iter().find(|(id, [coarse, .., fine])| {
-            let numeric = declared(id).is_some_and(|p| p.choices.is_empty());
-            numeric && differ(&with(id, *coarse), &with(id, *fine))
+            is_number(id) && differ(&with(id, *coarse), &with(id, *fine))
         });
         let Some((id, values)) = control else {
             schemes.push(Scheme {

@@ -138,6 +138,16 @@ impl Study {
         }
     }
 
+    /// Adds a row, judges all anew, and hands the study to `done`.
+    ///
+    /// # Errors
+    /// That of `done`.
+    pub(super) fn show(&mut self, row: Row, done: &mut Done<'_>) -> Result<(), crate::Error> {
+        self.rows.push(row);
+        self.judge();
+        done(self)
+    }
+
     /// Marks what lies below the uncertainty of its reference, and what nothing beats.
     pub(super) fn judge(&mut self) {
         for number in 0..self.references.len() {

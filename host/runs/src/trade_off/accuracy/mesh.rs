@@ -77,6 +77,12 @@ pub(super) fn refine(
             break;
         }
     }
+    let chosen = chosen(levels, most, why)?;
+    Ok((settings.divided(chosen.divided_by), chosen))
+}
+
+/// The coarsest mesh whose error is at most `most`, else the finest; `why` there is no finer one.
+fn chosen(levels: Levels, most: f64, why: Option<String>) -> Result<ChosenMesh, Error> {
     let (difference, worst) = (levels.difference(), levels.worst());
     let estimate = match levels.growth() {
         Some(differences) => messages::mesh_diverges(levels.len(), differences, why),
@@ -85,13 +91,11 @@ pub(super) fn refine(
     let of_finest = error(&levels);
     let none = || Error::internal("the run on the file's mesh is lost".to_owned());
     let (division, _, error) = levels.take(of_finest, most).ok_or_else(none)?;
-    let division = division as usize;
-    let chosen = ChosenMesh {
-        divided_by: division,
+    Ok(ChosenMesh {
+        divided_by: division as usize,
         error,
         difference,
         worst,
         estimate,
-    };
-    Ok((settings.divided(division), chosen))
+    })
 }

@@ -2,7 +2,7 @@
 
 use super::STUDY;
 use crate::experiment::progress::in_words;
-use input::accuracy_settings::{AccuracySettings, FailedTrial, Verdict};
+use input::accuracy_settings::{AccuracySettings, ChosenMesh, FailedTrial, Verdict};
 use std::fmt::Write;
 
 /// A trial came to no end.
@@ -99,6 +99,16 @@ pub(in super::super) fn zero(names: &[String]) -> String {
     )
 }
 
+/// The mesh that is chosen, and its error.
+fn of_mesh(mesh: &ChosenMesh) -> String {
+    let estimate = &mesh.estimate;
+    match (mesh.error, mesh.divided_by) {
+        (Some(error), 1) => format!("; the file's mesh, its error {error:.1e} ({estimate})"),
+        (Some(error), by) => format!("; mesh / {by}, its error {error:.1e} ({estimate})"),
+        (None, _) => format!("; error of the mesh: {estimate}"),
+    }
+}
+
 /// The choice, its error, and the failed trials.
 fn settings(chosen: &AccuracySettings) -> String {
     let asked = format!("{:.1e} asked for", chosen.asked);
@@ -111,22 +121,9 @@ fn settings(chosen: &AccuracySettings) -> String {
         ),
         (None, None, None) => format!("{asked}; a single run came to its end"),
     };
-    let mesh = chosen.mesh.as_ref().map(|mesh| match mesh.error {
-        Some(error) if mesh.divided_by == 1 => {
-            format!(
-                "; the file's mesh, its error {error:.1e} ({})",
-                mesh.estimate
-            )
-        }
-        Some(error) => format!(
-            "; mesh / {}, its error {error:.1e} ({})",
-            mesh.divided_by, mesh.estimate
-        ),
-        None => format!("; error of the mesh: {}", mesh.estimate),
-    });
-    let increments: Vec<String> = chosen
-        .increments
-        .iter()
+    let mesh = chosen.mesh.as_ref().map(of_mesh);
+    let increments = chosen.increments.iter();
+    let increments: Vec<String> = increments
         .map(|(phase, n)| format!("{phase} {n}"))
         .collect();
     let mut text = format!(
@@ -137,15 +134,11 @@ fn settings(chosen: &AccuracySettings) -> String {
         chosen.parameters.join(" ")
     );
     text.truncate(text.trim_end().len());
-    let of_mesh = chosen.mesh.as_ref().filter(|mesh| {
-        let rest = chosen.without_mesh.unwrap_or_default();
-        mesh.difference.is_some_and(|difference| difference > rest)
-    });
-    let worst = of_mesh.map_or(&chosen.worst, |mesh| &mesh.worst);
-    if let Some(probe) = worst
-        .as_ref()
-        .filter(|_| chosen.verdict != Verdict::Reached)
-    {
+    let rest = chosen.without_mesh.unwrap_or_default();
+    let is_mesh_worse = |mesh: &&ChosenMesh| mesh.difference.is_some_and(|d| d > rest);
+    let worse_mesh = chosen.mesh.as_ref().filter(is_mesh_worse);
+    let worst = worse_mesh.map_or(&chosen.worst, |mesh| &mesh.worst);
+    if let (Some(probe), Verdict::NotReached | Verdict::NotKnown) = (worst, chosen.verdict) {
         let _ = write!(text, "; the runs differ most in `{probe}`");
     }
     if chosen.cut_back > 0 && chosen.without_mesh.is_some() {

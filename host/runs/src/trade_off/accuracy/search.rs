@@ -14,6 +14,7 @@ use crate::experiment::progress::in_words;
 use crate::experiment::{Timing, Trial};
 use input::Kind;
 use input::accuracy_settings::FailedTrial;
+use std::path::Path;
 use std::time::Instant;
 
 /// Factors of the file's increments.
@@ -60,7 +61,27 @@ pub(super) struct Search<'a> {
     pub(super) say: &'a mut dyn FnMut(&str),
 }
 
-impl Search<'_> {
+impl<'a> Search<'a> {
+    /// Before the first trial; `folder` is where its table is.
+    ///
+    /// # Errors
+    /// The table cannot be written.
+    pub(super) fn new(
+        trials: &'a Trials<'a>,
+        asked: f64,
+        folder: &Path,
+        say: &'a mut dyn FnMut(&str),
+    ) -> Result<Self, Error> {
+        Ok(Self {
+            trials,
+            asked,
+            runs: 0,
+            table: Table::begin(folder)?,
+            failed: Vec::new(),
+            say,
+        })
+    }
+
     /// The file's scheme, if it is good enough: looking for a better one costs more runs than it saves. Else
     /// of the others the cheapest that is, unless runs are long.
     ///
