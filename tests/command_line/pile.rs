@@ -1,6 +1,8 @@
 //! `[pile]`: loads that close, what holds along the shaft, resistances, messages.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
+mod messages;
+
 use crate::program::{BAD_INPUT, DONE, Place};
 use serde_json::Value;
 use std::collections::HashMap;
@@ -125,10 +127,6 @@ fn assert_closes(place: &Place, weight: impl Fn(&Row) -> f64) {
 }
 
 #[test]
-#[expect(
-    clippy::too_many_lines,
-    reason = "one problem, from its file to its rows"
-)]
 fn head_and_weight_are_shaft_and_base() {
     let (place, stdout) = run(PILE);
     let area = PI * 0.16;
@@ -152,8 +150,26 @@ fn head_and_weight_are_shaft_and_base() {
         value(rest, "pile_shaft_load").abs() < 1e-9 * ground,
         "{rest:?}"
     );
-    let at_rest = rows(&place.path("out/pile.csv"));
-    for station in at_rest.iter().filter(|row| row["phase"] == "rest") {
+    let stations = rows(&place.path("out/pile.csv"));
+    assert_at_rest(&stations, area);
+    assert_friction_holds(&stations, area);
+    // Pulled: the other way round.
+    let last = history.last().unwrap();
+    assert!(
+        value(last, "pile_head_load") < 0.0 && value(last, "pile_shaft_load") < 0.0,
+        "{last:?}"
+    );
+    assert!(
+        (value(last, "pile_settlement") + 0.01).abs() < 1e-12,
+        "{last:?}"
+    );
+    assert_resistances(&place, &stdout, &history, area);
+}
+
+/// At rest the stress of the ground alone is in the pile and on its shaft.
+fn assert_at_rest(stations: &[Row], area: f64) {
+    let at_rest = || stations.iter().filter(|row| row["phase"] == "rest");
+    for station in at_rest() {
         let z = value(station, "z");
         let above = if z > -1.3 {
             -17.0 * z
@@ -177,19 +193,18 @@ fn head_and_weight_are_shaft_and_base() {
         off("slip", 0.0);
     }
     // The stations are the ends of the shaft's elements.
-    let z: Vec<f64> = at_rest
-        .iter()
-        .filter(|row| row["phase"] == "rest")
-        .map(|row| value(row, "z"))
-        .collect();
+    let z: Vec<f64> = at_rest().map(|row| value(row, "z")).collect();
     let expected = [0.0, -1.0, -2.0, -3.0, -4.0, -5.0];
     assert!(
         z.iter().zip(expected).all(|(z, e)| (z - e).abs() < 1e-12),
         "{z:?}"
     );
     assert_eq!(z.len(), expected.len());
-    // Pushed: friction holds the pile up as far as Coulomb's law lets it, and the axial force falls by it.
-    let pushed: Vec<&Row> = at_rest
+}
+
+/// Pushed: friction holds the pile up as far as Coulomb's law lets it, and the axial force falls by it.
+fn assert_friction_holds(stations: &[Row], area: f64) {
+    let pushed: Vec<&Row> = stations
         .iter()
         .filter(|row| row["phase"] == "push" && row["increment"] == "12")
         .collect();
@@ -209,19 +224,12 @@ fn head_and_weight_are_shaft_and_base() {
         let own = area * 24.0 * (value(pair[0], "z") - value(pair[1], "z"));
         assert!(b < a + own, "{pair:?}");
     }
-    // Pulled: the other way round.
-    let last = history.last().unwrap();
-    assert!(
-        value(last, "pile_head_load") < 0.0 && value(last, "pile_shaft_load") < 0.0,
-        "{last:?}"
-    );
-    assert!(
-        (value(last, "pile_settlement") + 0.01).abs() < 1e-12,
-        "{last:?}"
-    );
+}
 
+/// Resistances are read off the curve of the head.
+fn assert_resistances(place: &Place, stdout: &str, history: &[Row], area: f64) {
     // The criterion at 10 % of the base's width, between two increments, printed with its split.
-    let pile = &summary(&place)["pile"];
+    let pile = &summary(place)["pile"];
     assert!((pile["diameter"].as_f64().unwrap() - 0.8).abs() < 1e-12);
     assert_eq!(pile["phase"], "push");
     let push: Vec<&Row> = history
@@ -358,57 +366,6 @@ base = "foot"
 head = "head"
 "#;
 
-/// Without normal stress, and without strength against tension, its sign in a last bit would decide where the bar holds.
-#[test]
-fn a_bond_that_begins_without_normal_stress_is_warned_of_where_it_opens() {
-    let end = BAR.find("[[phase]]\nname = \"on\"").unwrap();
-    let pile = BAR.find("[pile]").unwrap();
-    let confined = format!("{}{}", &BAR[..end], &BAR[pile..]);
-    let bare = confined.replace("stress_11 = -100.0, stress_33 = -100.0", "stress_33 = 0.0");
-    let glued = bare.replace(
-        "dilatancy_angle = 0.0 }",
-        "dilatancy_angle = 0.0, tensile_strength = 500.0 }",
-    );
-    let says =
-        "interface `bond` began without normal stress, and the bond of its law `bond` breaks";
-    // All of the bond is elastic up to a slip of τ/k at the head: P = 2πaτ tanh(βL)/β, β = 0.4/m.
-    let expected = 2.0 * PI * 0.0125 * 500.0 * f64::tanh(0.4) / 0.4;
-    for text in [&confined, &glued] {
-        let place = Place::new();
-        let outcome = place.run_case(text);
-        assert!(
-            !outcome.says("began without normal stress"),
-            "{}",
-            outcome.stderr
-        );
-        let rows = rows(&place.path("out/history.csv"));
-        let head = -value(rows.last().unwrap(), "pile_head_load");
-        assert!((head - expected).abs() < 1e-3 * expected, "{head}");
-    }
-    for increments in ["increments = 2", "increments = 1"] {
-        let place = Place::new();
-        let outcome = place.run_case(bare.replace("increments = 2", increments));
-        assert!(outcome.says(says), "{}", outcome.stderr);
-    }
-    // A phase in which nothing happens leaves the bond as it was.
-    let later = bare.replacen(
-        "[[phase]]\n",
-        "[[phase]]\nname = \"rest\"\nincrements = 1\n[[phase]]\n",
-        1,
-    );
-    let outcome = Place::new().run_case(later);
-    assert!(outcome.says(says), "{}", outcome.stderr);
-    // Joined by friction alone it would not have held either.
-    let loose = bare.replace("cohesion = 500.0", "cohesion = 0.0");
-    let place = Place::new();
-    let outcome = place.run_case(loose);
-    assert!(
-        !outcome.says("began without normal stress"),
-        "{}",
-        outcome.stderr
-    );
-}
-
 /// Pull-out of an elastic bar from rigid surroundings, bond elastic to τ at the slip τ/k and level from
 /// there. P = 2πaτ (x + tanh β(L − x)/β) where the plastic length is x, at the displacement
 /// u = τ/k (1 + βx tanh β(L − x) + β²x²/2), with β² = 2πak/(EA).
@@ -480,91 +437,6 @@ fn a_bar_is_pulled_out_by_its_shear_lag() {
 }
 
 #[test]
-fn what_is_no_pile_is_told_where_it_is_written() {
-    for (edit, says) in [
-        (
-            ("group = [\"top\", \"foot\"]", "group = [\"top\", \"fot\"]"),
-            "[pile]: there is no group `fot`",
-        ),
-        (
-            ("group = [\"top\", \"foot\"]", "group = \"upper\""),
-            "`upper` is an interface",
-        ),
-        (
-            (
-                "shaft = [\"upper\", \"lower\"]",
-                "shaft = [\"upper\", \"lover\"]",
-            ),
-            "there is no group `lover`",
-        ),
-        (
-            (
-                "shaft = [\"upper\", \"lower\"]",
-                "shaft = [\"upper\", \"soil\"]",
-            ),
-            "`soil` is no interface",
-        ),
-        (
-            ("shaft = [\"upper\", \"lower\"]", "shaft = []"),
-            "`shaft` is an empty list",
-        ),
-        (
-            ("base = \"toe\"\n", "base = \"tow\"\n"),
-            "there is neither a group nor a line `tow`",
-        ),
-        (
-            ("base = \"toe\"\n", "base = \"soil\"\n"),
-            "`soil` is no interface",
-        ),
-        (
-            ("base = \"toe\"\n", "base = \"bottom\"\n"),
-            "`bottom` does not touch the pile's groups",
-        ),
-        (
-            ("base = \"toe\"\n", "base = \"inside\"\n"),
-            "`inside` lies inside the pile's groups",
-        ),
-        (
-            ("head = \"head\"\n", "head = \"haed\"\n"),
-            "there is no line `haed`",
-        ),
-        (
-            ("head = \"head\"\n", "head = \"far\"\n"),
-            "`far` has no edge of the pile's elements: name the line along the top of the pile",
-        ),
-        (
-            ("head = \"head\"\n", "head = \"head\"\ndiameter = -1.0\n"),
-            "diameter",
-        ),
-        (
-            (
-                "[pile]",
-                "[probes]\npile_head_load = { line = \"head\", quantity = \"displacement_z\" }\n[pile]",
-            ),
-            "is a column of history.csv already",
-        ),
-    ] {
-        let place = Place::new();
-        assert!(PILE.contains(edit.0), "{edit:?}");
-        let at = PILE.rfind("[pile]").unwrap();
-        let text = PILE[..at].to_owned() + &PILE[at..].replacen(edit.0, edit.1, 1);
-        place.write("pile.toml", text);
-        let outcome = place.run(&["run", "pile.toml", "--out", "out"]);
-        assert_eq!(
-            outcome.code,
-            Some(BAD_INPUT),
-            "{edit:?}: {}",
-            outcome.stderr
-        );
-        assert!(
-            outcome.says(says) && outcome.says("pile.toml:"),
-            "{says}: {}",
-            outcome.stderr
-        );
-    }
-}
-
-#[test]
 fn a_pile_that_is_not_there_has_no_rows() {
     let text = PILE
         .replace("[[phase]]\nname = \"pull\"", "[[phase]]\nname = \"gone\"")
@@ -584,38 +456,6 @@ fn a_pile_that_is_not_there_has_no_rows() {
             .iter()
             .all(|row| row["phase"] != "gone")
     );
-}
-
-#[test]
-fn a_figure_along_the_pile_is_drawn_or_told_what_is_wrong() {
-    let figure = |along: &str, x: &str| {
-        format!("\n[[figure]]\nname = \"forces\"\nx = \"{x}\"\ny = [\"z\"]\n{along}\n")
-    };
-    let (place, _) = run(&(PILE.to_owned() + &figure("along_pile = {}", "axial_force")));
-    let drawn = std::fs::read_to_string(place.path("out/forces.svg")).unwrap();
-    assert!(drawn.contains("pull 4"), "a curve for the end of a phase");
-    let without = PILE[..PILE.rfind("[pile]").unwrap()].to_owned();
-    for (text, along, x, says) in [
-        (
-            PILE,
-            "along_pile = {}",
-            "traction_n",
-            "there is no column of pile.csv `traction_n`",
-        ),
-        (
-            PILE,
-            "along_pile = {}\npoints = {}",
-            "z",
-            "over points or along the pile, not both",
-        ),
-        (&without, "along_pile = {}", "z", "there is no pile"),
-    ] {
-        let place = Place::new();
-        place.write("pile.toml", text.to_owned() + &figure(along, x));
-        let outcome = place.run(&["run", "pile.toml"]);
-        assert_eq!(outcome.code, Some(BAD_INPUT), "{says}: {}", outcome.stderr);
-        assert!(outcome.says(says), "{says}: {}", outcome.stderr);
-    }
 }
 
 /// A part of the pile is taken away and its interface is not: this ended in singular equations.
@@ -675,72 +515,6 @@ fn the_friction_of_a_tube_is_the_mean_by_girth() {
         }
         _ => PI * 0.12 * 5.0 * 24.0,
     });
-}
-
-#[test]
-fn what_is_odd_about_a_pile_is_said_before_it_is_loaded() {
-    let plane = "analysis = \"plane_strain\"";
-    for (edit, says) in [
-        (("", ""), None),
-        (
-            ("shaft = [\"upper\", \"lower\"]", "shaft = [\"upper\"]"),
-            Some(
-                "group `lower` touches the pile between z = -5.0000 and -3.0000 m and is not listed in `shaft`",
-            ),
-        ),
-        (
-            (
-                "head = { r = [0.0, 0.4], z = 0.0 }",
-                "head = { r = [0.0, 0.2], z = 0.0 }",
-            ),
-            Some("head line `head` leaves out part of the pile's top, from x = 0.3000 to 0.4000"),
-        ),
-        (
-            (
-                "head = { r = [0.0, 0.4], z = 0.0 }",
-                "head = { r = [0.0, 0.4], z = -1.0 }",
-            ),
-            Some(
-                "the pile's groups reach up to z = 0.0000 m, above its head line `head` at -1.0000 m",
-            ),
-        ),
-        (
-            (
-                "upper = { r = 0.4, z = [-3.0, 0.0] }",
-                "upper = { r = 0.4, z = [-6.0, 0.0] }",
-            ),
-            Some("elements of shaft `upper` do not touch the pile"),
-        ),
-        (
-            ("analysis = \"axisymmetric\"", plane),
-            Some("criteria use its width of 0.4 m; `diameter = 0.8` is the full width"),
-        ),
-        (
-            ("head = \"head\"\n", "head = \"head\"\ndiameter = 0.8\n"),
-            None,
-        ),
-    ] {
-        let place = Place::new();
-        assert!(PILE.contains(edit.0), "{edit:?}");
-        let mut text = PILE.replacen(edit.0, edit.1, 1);
-        if edit.1.contains("-6.0") {
-            let lower = "lower = { formulation = \"zero_thickness\", line = \"lower\", law = \"skin\", active = false }\n";
-            text = text
-                .replace(lower, "")
-                .replace("\"upper\", \"lower\"", "\"upper\"");
-            text = text.replace(
-                "{ n = 3, to = -5.0 }",
-                "{ n = 2, to = -6.0 }, { n = 1, to = -5.0 }",
-            );
-        }
-        place.write("pile.toml", text);
-        let outcome = place.run(&["run", "pile.toml", "--out", "out", "--dry-run"]);
-        assert_eq!(outcome.code, Some(DONE), "{edit:?}: {}", outcome.stderr);
-        match says {
-            Some(says) => assert!(outcome.says(says), "{says}: {}", outcome.stderr),
-            None => assert!(!outcome.says("[pile]:"), "{edit:?}: {}", outcome.stderr),
-        }
-    }
 }
 
 /// The picture of the test begins where the test does: at the state that the phase before it left, or

@@ -22,9 +22,34 @@ struct Joint {
 const GAP: usize = 2;
 const BROKEN: usize = 3;
 
+/// |τ| in a double.
+fn magnitude(tau: Wide) -> Wide {
+    wide(tau.0.abs() + if tau.0 < 0.0 { -tau.1 } else { tau.1 })
+}
+
+fn tan(angle: f64) -> Wide {
+    let (sin, cos) = sin_cos(angle);
+    sin / cos
+}
+
 impl Joint {
+    /// Whether an increment from ξ may end open, after this plastic slip and with this gap.
+    fn is_open(
+        &self,
+        xi: f64,
+        end: &Response,
+        [slip, gap]: [Wide; 2],
+        scale: f64,
+    ) -> Result<(), String> {
+        near("t_n", end.flux[0], 0.0, 0.0)?;
+        near("τ", end.flux[1], 0.0, 0.0)?;
+        near("broken", end.state[BROKEN], 1.0, 0.0)?;
+        near("gap", end.state[GAP], gap.0, 1e-11 * scale)?;
+        let tolerance = 1e-9 * slip.0.abs() + 1e-11 * scale.min(1.0) * self.k_n / self.k_t;
+        near("Δξ", end.state[0] - xi, slip.0, tolerance + 1e-14 * xi)
+    }
+
     /// Whether an increment may end so.
-    #[expect(clippy::too_many_lines, reason = "one increment, case by case")]
     fn check(
         &self,
         flux: &[f64],
@@ -33,28 +58,12 @@ impl Joint {
         end: &Response,
     ) -> Result<(), String> {
         let (k_n, k_t) = (wide(self.k_n), wide(self.k_t));
-        let tan = |angle: f64| {
-            let (sin, cos) = sin_cos(angle);
-            sin / cos
-        };
         let (tan_phi, tan_psi) = (tan(self.phi), tan(self.psi));
         let [mut opening, mut slip] = [wide(increment[0]), wide(increment[1])];
         let mut start = [wide(flux[0]), wide(flux[1])];
         let mut broken = state[BROKEN] > 0.5;
         let gap = wide(state[GAP]);
-        let open = |slip: Wide, gap: Wide, scale: f64| {
-            near("t_n", end.flux[0], 0.0, 0.0)?;
-            near("τ", end.flux[1], 0.0, 0.0)?;
-            near("broken", end.state[BROKEN], 1.0, 0.0)?;
-            near("gap", end.state[GAP], gap.0, 1e-11 * scale)?;
-            let tolerance = 1e-9 * slip.0.abs() + 1e-11 * scale.min(1.0) * self.k_n / self.k_t;
-            near(
-                "Δξ",
-                end.state[0] - state[0],
-                slip.0,
-                tolerance + 1e-14 * state[0],
-            )
-        };
+        let open = |slip, gap, scale| self.is_open(state[0], end, [slip, gap], scale);
         if gap.0 > 0.0 {
             let left = gap + opening;
             if left.0 >= 0.0 {
@@ -77,18 +86,8 @@ impl Joint {
             start[1].0.abs().max((self.k_t * increment[1]).abs()),
         ];
         // Rounding of the trial traction, and what the flow makes of it.
-        let blur = [
-            16.0 * f64::EPSILON * sizes[0],
-            16.0 * f64::EPSILON * sizes[1],
-        ];
-        let tau = wide(
-            trial[1].0.abs()
-                + if trial[1].0 < 0.0 {
-                    -trial[1].1
-                } else {
-                    trial[1].1
-                },
-        );
+        let blur = sizes.map(|size| 16.0 * f64::EPSILON * size);
+        let tau = magnitude(trial[1]);
         let excess = tau + trial[0] * tan_phi - c;
         let resistance = k_t + k_n * tan_phi * tan_psi;
         let excess_blur = blur[1] + blur[0] * tan_phi.0 + 16.0 * f64::EPSILON * c.0;
@@ -151,10 +150,6 @@ impl Joint {
 
     /// Plastic slip until t_n reaches the tensile strength, by the rates of each stretch.
     fn slip_until_open(&self, start: [Wide; 2], rates: [Wide; 2], strength: [Wide; 2]) -> Wide {
-        let tan = |angle: f64| {
-            let (sin, cos) = sin_cos(angle);
-            sin / cos
-        };
         let (tan_phi, tan_psi) = (tan(self.phi), tan(self.psi));
         let (k_n, k_t) = (wide(self.k_n), wide(self.k_t));
         let [c, r_t] = strength;

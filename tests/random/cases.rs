@@ -4,6 +4,7 @@
 use crate::seeds::{End, hold};
 use input::{Error, Kind};
 use proptest::prelude::*;
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::Path;
 use tests::case::{Silent, run_text, table};
@@ -96,19 +97,30 @@ impl Model {
         }
     }
 
-    #[expect(clippy::too_many_lines, reason = "one list, in the order of the file")]
     fn text(&self) -> String {
+        let mut text = String::new();
+        let mut line = |entry: String| writeln!(text, "{entry}").unwrap();
+        self.write_mesh(&mut line);
+        self.write_laws(&mut line);
+        self.write_groups(&mut line);
+        self.write_phases(&mut line);
+        write_probes(self.size, &mut line);
+        line(format!(
+            "[solver]\ntolerated_residual = 0.0\nmethod = '{}'\nequations = '{}'\nmax_halvings = {}",
+            self.method, self.equations, self.halvings
+        ));
+        text
+    }
+
+    fn write_mesh(&self, line: &mut dyn FnMut(String)) {
         let ([x0, x1, x2, x3], [y0, y1, y2, y3]) = (self.x(), self.y());
         let foot = self.foot();
         let [block, soil, below, beside] = self.n;
-        let u = self.unit;
-        let mut text = String::new();
         let analysis = if self.is_axisymmetric {
             "axisymmetric"
         } else {
             "plane_strain"
         };
-        let mut line = |entry: String| writeln!(text, "{entry}").unwrap();
         line(format!("title = 'random'\nanalysis = '{analysis}'\n[mesh]"));
         line(format!("origin = [{x0}, {y0}]"));
         line(format!(
@@ -134,6 +146,10 @@ impl Model {
              surface = {{ y = {y3}, x = [{x2}, {x3}] }}\nhead = {{ y = {y3}, x = [{x0}, {x1}] }}\n\
              beside = {{ x = {x1}, y = [{foot}, {y3}] }}\nbelow = {{ y = {foot}, x = [{x0}, {x1}] }}"
         ));
+    }
+
+    fn write_laws(&self, line: &mut dyn FnMut(String)) {
+        let u = self.unit;
         let (law, cohesion, phi, psi, tensile) = self.soil;
         line(format!(
             "[laws.steel]\nlaw = 'elastic'\nparameters = {{ young_modulus = {:e}, poisson_ratio = 0.28 }}",
@@ -187,7 +203,15 @@ impl Model {
                 self.seam_law
             ));
         }
-        let p = -self.initial * u * 100.0;
+    }
+
+    /// Initial pressure.
+    fn pressure(&self) -> f64 {
+        -self.initial * self.unit * 100.0
+    }
+
+    fn write_groups(&self, line: &mut dyn FnMut(String)) {
+        let p = self.pressure();
         let initial = format!("initial_stress = {{ 11 = {p:e}, 22 = {p:e}, 33 = {p:e} }}");
         line(format!(
             "[groups.a]\nformulation = 'solid'\nlaw = 'soil'\nintegration = '{}'\n{initial}",
@@ -223,6 +247,10 @@ impl Model {
                 ));
             }
         }
+    }
+
+    fn write_phases(&self, line: &mut dyn FnMut(String)) {
+        let p = self.pressure();
         let [sideways, right] = self.is_held;
         let fixed = if sideways { "'x', 'y'" } else { "'y'" };
         line(format!(
@@ -240,7 +268,7 @@ impl Model {
             let what = match load {
                 Load::Pressure(times) => format!(
                     "pressure = [{{ line = 'surface', value = {:e} }}]",
-                    -p + times * u * 100.0
+                    -p + times * self.unit * 100.0
                 ),
                 Load::Push(times) => {
                     let y = times * self.size;
@@ -253,46 +281,22 @@ impl Model {
                  reset_displacements = {resets}\n{what}"
             ));
         }
-        line("[probes]".to_owned());
-        // Nodes at corners belong to two lines and count once.
-        let inner = format!("y = [{:e}, {:e}]", 1e-9 * self.size, 2.0 * self.size);
-        for (name, of, quantity, more) in [
-            ("head_y", "head", "reaction_y", ""),
-            ("bottom_y", "bottom", "reaction_y", ""),
-            ("bottom_x", "bottom", "reaction_x", ""),
-            ("left_x", "left", "reaction_x", inner.as_str()),
-            ("right_x", "right", "reaction_x", inner.as_str()),
-        ] {
-            let comma = if more.is_empty() { "" } else { ", " };
-            line(format!(
-                "{name} = {{ line = '{of}', quantity = '{quantity}'{comma}{more} }}"
-            ));
-        }
-        for of in ["head", "surface", "right", "beside", "below", "left"] {
-            for axis in ["x", "y"] {
-                for reduce in ["min", "max"] {
-                    line(format!(
-                        "{of}_{axis}_{reduce} = {{ line = '{of}', quantity = 'displacement_{axis}', reduce = '{reduce}' }}"
-                    ));
-                }
+    }
+
+    /// Whether nothing moves so far that there has to be a warning.
+    fn moves_little(&self, values: &BTreeMap<&str, f64>, place: &str) -> Result<(), String> {
+        for (column, value) in values {
+            let is_strain = column.starts_with("strain");
+            let moves = column.ends_with("_min") || column.ends_with("_max");
+            let most = if is_strain { 10.0 } else { 10.0 * self.size };
+            if moves && value.abs() > most {
+                return Err(format!("{place}: {column} is {value:e} without a warning"));
             }
         }
-        for component in ["11", "22", "12"] {
-            for reduce in ["min", "max"] {
-                line(format!(
-                    "strain_{component}_{reduce} = {{ group = 'a', quantity = 'strain_{component}', reduce = '{reduce}' }}"
-                ));
-            }
-        }
-        line(format!(
-            "[solver]\ntolerated_residual = 0.0\nmethod = '{}'\nequations = '{}'\nmax_halvings = {}",
-            self.method, self.equations, self.halvings
-        ));
-        text
+        Ok(())
     }
 
     /// Whether rows keep what was asked, and how the run ended.
-    #[expect(clippy::too_many_lines, reason = "one list, in the order of the table")]
     fn check(&self, result: &Result<Silent, Error>, folder: &Path) -> Result<End, String> {
         let end = match result {
             Ok(_) => End::Done,
@@ -339,17 +343,7 @@ impl Model {
                     return Ok(end);
                 };
                 let place = format!("{name} {k}");
-                let mut values = std::collections::BTreeMap::new();
-                for (column, cell) in row {
-                    let value: f64 = match (column.as_str(), cell.as_str()) {
-                        ("phase", _) | (_, "") => continue,
-                        (_, cell) => cell.parse().map_err(|_| format!("{place}: {cell}"))?,
-                    };
-                    if !value.is_finite() {
-                        return Err(format!("{place}: {column} is {cell}"));
-                    }
-                    values.insert(column.as_str(), value);
-                }
+                let values = numbers(row, &place)?;
                 let part = k as f64 / *increments as f64;
                 let at = |ends: [f64; 2]| ends[0] + part * (ends[1] - ends[0]);
                 // In the first phase the initial stress is there, and its load comes.
@@ -394,18 +388,66 @@ impl Model {
                         }
                     }
                 }
-                for (column, value) in &values {
-                    let is_strain = column.starts_with("strain");
-                    let moves = column.ends_with("_min") || column.ends_with("_max");
-                    let most = if is_strain { 10.0 } else { 10.0 * self.size };
-                    if moves && value.abs() > most && warnings == 0 {
-                        return Err(format!("{place}: {column} is {value:e} without a warning"));
-                    }
+                if warnings == 0 {
+                    self.moves_little(&values, &place)?;
                 }
             }
         }
         Ok(end)
     }
+}
+
+fn write_probes(size: f64, line: &mut dyn FnMut(String)) {
+    line("[probes]".to_owned());
+    // Nodes at corners belong to two lines and count once.
+    let inner = format!("y = [{:e}, {:e}]", 1e-9 * size, 2.0 * size);
+    for (name, of, quantity, more) in [
+        ("head_y", "head", "reaction_y", ""),
+        ("bottom_y", "bottom", "reaction_y", ""),
+        ("bottom_x", "bottom", "reaction_x", ""),
+        ("left_x", "left", "reaction_x", inner.as_str()),
+        ("right_x", "right", "reaction_x", inner.as_str()),
+    ] {
+        let comma = if more.is_empty() { "" } else { ", " };
+        line(format!(
+            "{name} = {{ line = '{of}', quantity = '{quantity}'{comma}{more} }}"
+        ));
+    }
+    for of in ["head", "surface", "right", "beside", "below", "left"] {
+        for axis in ["x", "y"] {
+            for reduce in ["min", "max"] {
+                line(format!(
+                    "{of}_{axis}_{reduce} = {{ line = '{of}', quantity = 'displacement_{axis}', reduce = '{reduce}' }}"
+                ));
+            }
+        }
+    }
+    for component in ["11", "22", "12"] {
+        for reduce in ["min", "max"] {
+            line(format!(
+                "strain_{component}_{reduce} = {{ group = 'a', quantity = 'strain_{component}', reduce = '{reduce}' }}"
+            ));
+        }
+    }
+}
+
+/// The numbers of a row; all of them have to be finite.
+fn numbers<'r>(
+    row: &'r BTreeMap<String, String>,
+    place: &str,
+) -> Result<BTreeMap<&'r str, f64>, String> {
+    let mut values = BTreeMap::new();
+    for (column, cell) in row {
+        let value: f64 = match (column.as_str(), cell.as_str()) {
+            ("phase", _) | (_, "") => continue,
+            (_, cell) => cell.parse().map_err(|_| format!("{place}: {cell}"))?,
+        };
+        if !value.is_finite() {
+            return Err(format!("{place}: {column} is {cell}"));
+        }
+        values.insert(column.as_str(), value);
+    }
+    Ok(values)
 }
 
 fn model(is_axisymmetric: bool) -> impl Strategy<Value = Model> {

@@ -1,0 +1,239 @@
+//! What is wrong or odd about a pile, and where it is written.
+
+use super::{BAR, PILE, rows, run, value};
+use crate::program::{BAD_INPUT, DONE, Place};
+use std::f64::consts::PI;
+
+/// Without normal stress, and without strength against tension, its sign in a last bit would decide where the bar holds.
+#[test]
+fn a_bond_that_begins_without_normal_stress_is_warned_of_where_it_opens() {
+    let end = BAR.find("[[phase]]\nname = \"on\"").unwrap();
+    let pile = BAR.find("[pile]").unwrap();
+    let confined = format!("{}{}", &BAR[..end], &BAR[pile..]);
+    let bare = confined.replace("stress_11 = -100.0, stress_33 = -100.0", "stress_33 = 0.0");
+    let glued = bare.replace(
+        "dilatancy_angle = 0.0 }",
+        "dilatancy_angle = 0.0, tensile_strength = 500.0 }",
+    );
+    let says =
+        "interface `bond` began without normal stress, and the bond of its law `bond` breaks";
+    // All of the bond is elastic up to a slip of τ/k at the head: P = 2πaτ tanh(βL)/β, β = 0.4/m.
+    let expected = 2.0 * PI * 0.0125 * 500.0 * f64::tanh(0.4) / 0.4;
+    for text in [&confined, &glued] {
+        let place = Place::new();
+        let outcome = place.run_case(text);
+        assert!(
+            !outcome.says("began without normal stress"),
+            "{}",
+            outcome.stderr
+        );
+        let rows = rows(&place.path("out/history.csv"));
+        let head = -value(rows.last().unwrap(), "pile_head_load");
+        assert!((head - expected).abs() < 1e-3 * expected, "{head}");
+    }
+    for increments in ["increments = 2", "increments = 1"] {
+        let place = Place::new();
+        let outcome = place.run_case(bare.replace("increments = 2", increments));
+        assert!(outcome.says(says), "{}", outcome.stderr);
+    }
+    // A phase in which nothing happens leaves the bond as it was.
+    let later = bare.replacen(
+        "[[phase]]\n",
+        "[[phase]]\nname = \"rest\"\nincrements = 1\n[[phase]]\n",
+        1,
+    );
+    let outcome = Place::new().run_case(later);
+    assert!(outcome.says(says), "{}", outcome.stderr);
+    // Joined by friction alone it would not have held either.
+    let loose = bare.replace("cohesion = 500.0", "cohesion = 0.0");
+    let place = Place::new();
+    let outcome = place.run_case(loose);
+    assert!(
+        !outcome.says("began without normal stress"),
+        "{}",
+        outcome.stderr
+    );
+}
+
+#[test]
+fn what_is_no_pile_is_told_where_it_is_written() {
+    for (edit, says) in [
+        (
+            ("group = [\"top\", \"foot\"]", "group = [\"top\", \"fot\"]"),
+            "[pile]: there is no group `fot`",
+        ),
+        (
+            ("group = [\"top\", \"foot\"]", "group = \"upper\""),
+            "`upper` is an interface",
+        ),
+        (
+            (
+                "shaft = [\"upper\", \"lower\"]",
+                "shaft = [\"upper\", \"lover\"]",
+            ),
+            "there is no group `lover`",
+        ),
+        (
+            (
+                "shaft = [\"upper\", \"lower\"]",
+                "shaft = [\"upper\", \"soil\"]",
+            ),
+            "`soil` is no interface",
+        ),
+        (
+            ("shaft = [\"upper\", \"lower\"]", "shaft = []"),
+            "`shaft` is an empty list",
+        ),
+        (
+            ("base = \"toe\"\n", "base = \"tow\"\n"),
+            "there is neither a group nor a line `tow`",
+        ),
+        (
+            ("base = \"toe\"\n", "base = \"soil\"\n"),
+            "`soil` is no interface",
+        ),
+        (
+            ("base = \"toe\"\n", "base = \"bottom\"\n"),
+            "`bottom` does not touch the pile's groups",
+        ),
+        (
+            ("base = \"toe\"\n", "base = \"inside\"\n"),
+            "`inside` lies inside the pile's groups",
+        ),
+        (
+            ("head = \"head\"\n", "head = \"haed\"\n"),
+            "there is no line `haed`",
+        ),
+        (
+            ("head = \"head\"\n", "head = \"far\"\n"),
+            "`far` has no edge of the pile's elements: name the line along the top of the pile",
+        ),
+        (
+            ("head = \"head\"\n", "head = \"head\"\ndiameter = -1.0\n"),
+            "diameter",
+        ),
+        (
+            (
+                "[pile]",
+                "[probes]\npile_head_load = { line = \"head\", quantity = \"displacement_z\" }\n[pile]",
+            ),
+            "is a column of history.csv already",
+        ),
+    ] {
+        let place = Place::new();
+        assert!(PILE.contains(edit.0), "{edit:?}");
+        let at = PILE.rfind("[pile]").unwrap();
+        let text = PILE[..at].to_owned() + &PILE[at..].replacen(edit.0, edit.1, 1);
+        place.write("pile.toml", text);
+        let outcome = place.run(&["run", "pile.toml", "--out", "out"]);
+        assert_eq!(
+            outcome.code,
+            Some(BAD_INPUT),
+            "{edit:?}: {}",
+            outcome.stderr
+        );
+        assert!(
+            outcome.says(says) && outcome.says("pile.toml:"),
+            "{says}: {}",
+            outcome.stderr
+        );
+    }
+}
+
+#[test]
+fn a_figure_along_the_pile_is_drawn_or_told_what_is_wrong() {
+    let figure = |along: &str, x: &str| {
+        format!("\n[[figure]]\nname = \"forces\"\nx = \"{x}\"\ny = [\"z\"]\n{along}\n")
+    };
+    let (place, _) = run(&(PILE.to_owned() + &figure("along_pile = {}", "axial_force")));
+    let drawn = std::fs::read_to_string(place.path("out/forces.svg")).unwrap();
+    assert!(drawn.contains("pull 4"), "a curve for the end of a phase");
+    let without = PILE[..PILE.rfind("[pile]").unwrap()].to_owned();
+    for (text, along, x, says) in [
+        (
+            PILE,
+            "along_pile = {}",
+            "traction_n",
+            "there is no column of pile.csv `traction_n`",
+        ),
+        (
+            PILE,
+            "along_pile = {}\npoints = {}",
+            "z",
+            "over points or along the pile, not both",
+        ),
+        (&without, "along_pile = {}", "z", "there is no pile"),
+    ] {
+        let place = Place::new();
+        place.write("pile.toml", text.to_owned() + &figure(along, x));
+        let outcome = place.run(&["run", "pile.toml"]);
+        assert_eq!(outcome.code, Some(BAD_INPUT), "{says}: {}", outcome.stderr);
+        assert!(outcome.says(says), "{says}: {}", outcome.stderr);
+    }
+}
+
+#[test]
+fn what_is_odd_about_a_pile_is_said_before_it_is_loaded() {
+    let plane = "analysis = \"plane_strain\"";
+    for (edit, says) in [
+        (("", ""), None),
+        (
+            ("shaft = [\"upper\", \"lower\"]", "shaft = [\"upper\"]"),
+            Some(
+                "group `lower` touches the pile between z = -5.0000 and -3.0000 m and is not listed in `shaft`",
+            ),
+        ),
+        (
+            (
+                "head = { r = [0.0, 0.4], z = 0.0 }",
+                "head = { r = [0.0, 0.2], z = 0.0 }",
+            ),
+            Some("head line `head` leaves out part of the pile's top, from x = 0.3000 to 0.4000"),
+        ),
+        (
+            (
+                "head = { r = [0.0, 0.4], z = 0.0 }",
+                "head = { r = [0.0, 0.4], z = -1.0 }",
+            ),
+            Some(
+                "the pile's groups reach up to z = 0.0000 m, above its head line `head` at -1.0000 m",
+            ),
+        ),
+        (
+            (
+                "upper = { r = 0.4, z = [-3.0, 0.0] }",
+                "upper = { r = 0.4, z = [-6.0, 0.0] }",
+            ),
+            Some("elements of shaft `upper` do not touch the pile"),
+        ),
+        (
+            ("analysis = \"axisymmetric\"", plane),
+            Some("criteria use its width of 0.4 m; `diameter = 0.8` is the full width"),
+        ),
+        (
+            ("head = \"head\"\n", "head = \"head\"\ndiameter = 0.8\n"),
+            None,
+        ),
+    ] {
+        let place = Place::new();
+        assert!(PILE.contains(edit.0), "{edit:?}");
+        let mut text = PILE.replacen(edit.0, edit.1, 1);
+        if edit.1.contains("-6.0") {
+            let lower = "lower = { formulation = \"zero_thickness\", line = \"lower\", law = \"skin\", active = false }\n";
+            text = text
+                .replace(lower, "")
+                .replace("\"upper\", \"lower\"", "\"upper\"");
+            text = text.replace(
+                "{ n = 3, to = -5.0 }",
+                "{ n = 2, to = -6.0 }, { n = 1, to = -5.0 }",
+            );
+        }
+        place.write("pile.toml", text);
+        let outcome = place.run(&["run", "pile.toml", "--out", "out", "--dry-run"]);
+        assert_eq!(outcome.code, Some(DONE), "{edit:?}: {}", outcome.stderr);
+        match says {
+            Some(says) => assert!(outcome.says(says), "{says}: {}", outcome.stderr),
+            None => assert!(!outcome.says("[pile]:"), "{edit:?}: {}", outcome.stderr),
+        }
+    }
+}

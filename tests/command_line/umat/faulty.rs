@@ -1,0 +1,129 @@
+//! Routines that do what they must not, in a run.
+
+use super::{driver, place, rows, soil};
+use crate::program::PLUGIN_TROUBLE;
+
+#[test]
+fn a_routine_that_ends_its_process_ends_an_increment() {
+    let Some(place) = place("stops") else {
+        return;
+    };
+    for (how, says) in [
+        (1, &["ended its process: exit code 3"][..]),
+        (
+            2,
+            &[
+                "called XIT",
+                "ended its process: exit code 70",
+                "AT POINT 1 OF UMAT_STO",
+            ],
+        ),
+        (3, &["crashed: signal 11"]),
+    ] {
+        let parameters = format!("how = {how}\nlimit = 1.1e-3");
+        place.write("driver.toml", driver("stops", "", &parameters));
+        let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
+        assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+        for text in says {
+            assert!(outcome.says(text), "{text}\n{}", outcome.stderr);
+        }
+        assert!(
+            outcome.says("segment 1, increment 6 of 10"),
+            "{}",
+            outcome.stderr
+        );
+        let rows = std::fs::read_to_string(place.path("out.csv")).unwrap();
+        assert_eq!(rows.lines().count(), 7, "{rows}");
+        let outcome = place.run(&["replay", "out.failure.toml"]);
+        assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+        assert!(outcome.stdout.contains("as recorded"), "{}", outcome.stdout);
+    }
+}
+
+#[test]
+fn a_tangent_that_is_left_unset_is_named() {
+    let Some(place) = place("unset") else {
+        return;
+    };
+    // Strains alone need no tangent; a stress does.
+    let text = driver("unset", "", "");
+    assert_eq!(rows(&place, &text).len(), 11);
+    place.write(
+        "driver.toml",
+        text.replacen("11 = { strain = 1e-3 }", "11 = { stress = -10.0 }", 1),
+    );
+    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
+    assert_eq!(outcome.code, Some(2), "{}", outcome.stderr);
+    assert!(outcome.says("DDSDDE of a UMAT"), "{}", outcome.stderr);
+    assert!(!outcome.says("beyond strength"), "{}", outcome.stderr);
+    let outcome = place.run(&["check", "libunset.so"]);
+    assert!(
+        outcome.stdout.contains("the routine leaves it unset"),
+        "{}",
+        outcome.stdout
+    );
+}
+
+#[test]
+fn a_routine_without_an_answer_is_the_librarys_fault() {
+    let Some(place) = place("stops") else {
+        return;
+    };
+    for (how, says) in [
+        (4, "leaves PNEWDT = -1"),
+        (5, "leaves PNEWDT = NaN"),
+        (6, "leaves STRESS with values that are not finite"),
+    ] {
+        // In the first call, without any strain, and on the way.
+        for (limit, at) in [("-1.0", "initial state"), ("1.1e-3", "increment 6 of 10")] {
+            let parameters = format!("how = {how}\nlimit = {limit}");
+            place.write("driver.toml", driver("stops", "", &parameters));
+            let outcome = place.run(&["point", "driver.toml"]);
+            assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+            for text in [says, at] {
+                assert!(outcome.says(text), "{text}\n{}", outcome.stderr);
+            }
+        }
+        // The first increment of the run makes strains of 0.05 %.
+        for limit in ["-1.0", "7e-4"] {
+            let parameters = format!("poisson_ratio = 0.3, how = {how}, limit = {limit} }}");
+            let case = soil("stops", "").replacen("poisson_ratio = 0.3 }", &parameters, 1);
+            let outcome = place.run_case(case);
+            assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+            assert!(outcome.says(says), "{says}\n{}", outcome.stderr);
+        }
+        let outcome = place.run(&["replay", "out/failure.toml"]);
+        assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    }
+}
+
+#[test]
+fn what_is_overwritten_is_named() {
+    let Some(place) = place("overwrites") else {
+        return;
+    };
+    for (what, says) in [
+        (1, "overwrites CMNAME, which is an input"),
+        (2, "overwrites PROPS, which is an input"),
+        (3, "writes beyond the end of STATEV, which has 1 entries"),
+        (4, "writes in front of DSTRAN: entry 0 becomes 1e0"),
+        (5, "overwrites KINC, which is an input"),
+        // Arithmetic on what stands there shows too, even if it changes no number.
+        (6, "writes beyond the end of STATEV, which has 1 entries"),
+        (7, "writes beyond the end of STATEV, which has 1 entries"),
+        (8, "writes beyond the end of STATEV, which has 1 entries"),
+    ] {
+        place.write(
+            "driver.toml",
+            driver("overwrites", "", &format!("what = {what}")),
+        );
+        let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
+        assert_eq!(
+            outcome.code,
+            Some(PLUGIN_TROUBLE),
+            "{what}: {}",
+            outcome.stderr
+        );
+        assert!(outcome.says(says), "{says}\n{}", outcome.stderr);
+    }
+}

@@ -1,0 +1,122 @@
+//! Calls of routines that are recorded, for a debugger.
+
+use super::{driver, number, place, recorded, rows, soil};
+use crate::program::{BAD_INPUT, CASE, DONE, PLUGIN_TROUBLE};
+use tests::case::table;
+
+#[test]
+fn a_call_can_be_recorded() {
+    let Some(place) = place("elastic") else {
+        return;
+    };
+    let rows = rows(&place, &driver("elastic", "record = \"call.toml\"", ""));
+    let text = std::fs::read_to_string(place.path("call.toml")).unwrap();
+    let call: toml::Table = toml::from_str(&text).unwrap();
+    let argument = |when: &str, name: &str| call[when][name].clone();
+    let reals = |when: &str, name: &str| -> Vec<f64> {
+        let values = argument(when, name);
+        let values = values.as_array().unwrap().iter();
+        values.map(|value| value.as_float().unwrap()).collect()
+    };
+    assert_eq!(reals("before", "STRESS"), [0.0; 4]);
+    assert_eq!(
+        reals("after", "STRESS")[1].to_bits(),
+        number(&rows[1], "stress_22").to_bits()
+    );
+    assert_eq!(reals("before", "PROPS"), [2e4, 0.3]);
+    // Column by column.
+    let tangent = reals("after", "DDSDDE");
+    assert_eq!(tangent.len(), 16);
+    assert!(tangent[4] > 0.0 && tangent[3] == 0.0 && tangent[15] > 0.0);
+    let name = argument("before", "CMNAME");
+    assert_eq!(name.as_str().unwrap(), format!("{:<80}", "UMAT_ELASTIC"));
+    assert_eq!(call["before"].as_table().unwrap().len(), 37);
+}
+
+#[test]
+fn the_option_records_a_call() {
+    let Some(place) = place("elastic") else {
+        return;
+    };
+    place.write("driver.toml", driver("elastic", "", ""));
+    // What stood there is not mistaken for a record.
+    place.write("call.toml", "an earlier one");
+    let arguments = ["point", "driver.toml", "--record", "call.toml"];
+    let outcome = place.run(&[&arguments[..], &["--csv", "out.csv"]].concat());
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert!(
+        outcome.says("all arguments of one call in call.toml"),
+        "{}",
+        outcome.stderr
+    );
+    assert_eq!(recorded(&place, "call.toml", "before", "STRESS"), [0.0; 4]);
+    let rows = table(&place.path("out.csv"));
+    assert_eq!(
+        recorded(&place, "call.toml", "after", "STRESS")[0].to_bits(),
+        number(&rows[1], "stress_11").to_bits()
+    );
+
+    place.write("case.toml", soil("elastic", ""));
+    let outcome = place.run(&["run", "case.toml", "--out", "out", "--record", "run.toml"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    assert_eq!(recorded(&place, "run.toml", "before", "PROPS"), [1e4, 0.3]);
+
+    // With the native law there is nothing to record, with two it is not plain which.
+    place.write("native.toml", CASE);
+    let own = driver("elastic", "", "")
+        .replacen("umat_elastic", "elastic", 1)
+        .replacen("adapter = \"umat\"\nlibrary = \"libelastic.so\"\n", "", 1);
+    place.write("own.toml", own);
+    let second = soil("elastic", "").replacen(
+        "[laws.joint]",
+        "[laws.other]\nlaw = \"umat_elastic\"\nadapter = \"umat\"\n\
+         library = \"libelastic.so\"\n\n[laws.joint]",
+        1,
+    );
+    place.write("two.toml", second);
+    for (command, file, says) in [
+        ("run", "native.toml", "no law of native.toml is a UMAT"),
+        (
+            "run",
+            "two.toml",
+            "soil, other are UMATs; give the key `record`",
+        ),
+        ("point", "own.toml", "law `elastic` is no UMAT"),
+    ] {
+        place.write("none.toml", "an earlier one");
+        let outcome = place.run(&[command, file, "--record", "none.toml"]);
+        assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+        assert!(outcome.says(says), "{says}\n{}", outcome.stderr);
+    }
+    let outcome = place.run(&["point", "driver.toml", "--record", "no/where.toml"]);
+    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    // What stood there is not lost to a command that was refused.
+    let kept = std::fs::read_to_string(place.path("none.toml")).unwrap();
+    assert_eq!(kept, "an earlier one");
+}
+
+#[test]
+fn a_call_that_never_returns_is_recorded_too() {
+    let Some(place) = place("stops") else {
+        return;
+    };
+    place.write(
+        "driver.toml",
+        driver("stops", "", "how = 1\nlimit = 1.1e-3"),
+    );
+    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
+    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    let outcome = place.run(&["replay", "out.failure.toml", "--record", "call.toml"]);
+    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    let rows = table(&place.path("out.csv"));
+    let before = recorded(&place, "call.toml", "before", "STRESS");
+    assert_eq!(
+        before[1].to_bits(),
+        number(rows.last().unwrap(), "stress_22").to_bits()
+    );
+    let text = std::fs::read_to_string(place.path("call.toml")).unwrap();
+    assert!(
+        text.ends_with("# The routine has not returned.\n"),
+        "{text}"
+    );
+}
