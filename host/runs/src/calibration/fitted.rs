@@ -118,14 +118,8 @@ pub(super) fn fitted(
         let deviations = scatter.deviations(test, &known);
         let others = &mut said.others;
         others.extend(without_interval(model, test, &known));
-        let of_gradients = (of.as_slice(), gradients.as_slice());
-        others.extend(without_limit(
-            model,
-            stages,
-            test,
-            of_gradients,
-            &deviations,
-        ));
+        let own = (of.as_slice(), gradients.as_slice());
+        others.extend(without_limit(model, stages, test, own, &deviations));
         others.extend(on_a_bound(model, test, (&held, &by_held), &deviations));
         let values_found = model.values(counted);
         let values = test.of_curves(&computed).zip(test.of_curves(&deviations));

@@ -90,8 +90,6 @@ impl Minimum {
     }
 }
 
-/// Damping of the first step.
-const FIRST_DAMPING: f64 = 1e-3;
 /// Damping beyond which steps are nothing.
 const MOST_DAMPING: f64 = 1e16;
 /// Relative difference of two sums that may be of rounding.
@@ -106,6 +104,12 @@ struct Damping {
 }
 
 impl Damping {
+    /// That of the first step.
+    const FIRST: Self = Self {
+        value: 1e-3,
+        growth: 2.0,
+    };
+
     /// After a step that was taken; `ratio`: the reduction found over that foretold.
     fn ease(&mut self, ratio: f64) {
         self.value *= (1.0 - (2.0 * ratio - 1.0).powi(3)).max(1.0 / 3.0);
@@ -176,10 +180,7 @@ impl Minimum {
         settings: Settings,
     ) -> Result<End, P::Error> {
         let mut scale = vec![0.0_f64; self.u.len()];
-        let mut damping = Damping {
-            value: FIRST_DAMPING,
-            growth: 2.0,
-        };
+        let mut damping = Damping::FIRST;
         // Whether a step since the last one that was taken had no answer at its end.
         let mut is_barred = false;
         while self.iterations < settings.iterations {

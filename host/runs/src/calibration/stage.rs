@@ -137,7 +137,7 @@ pub(super) fn known_to(model: &Model, group: &Group) -> Exactness {
     }
 }
 
-/// How much residuals without weights, whose noise is known, change where a parameter goes through its range.
+/// How much the residuals, without their weights, change where a parameter goes through its range.
 fn plain_answers(
     model: &Model,
     group: &Group,

@@ -150,8 +150,7 @@ pub fn run_one(
     }
     let mut may_end = before != State::Done;
     let outcome = (|| {
-        let stop = observer.stop();
-        let studied = trade_off::reach_until(&case, (&folder, true), &stop, say)?;
+        let studied = trade_off::reach_until(&case, (&folder, true), &observer.stop(), say)?;
         let case = studied.as_ref().unwrap_or(&case);
         let ready = ready(case)?;
         refuse_changed(plan, &folder, &ready)?;
