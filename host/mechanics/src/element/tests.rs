@@ -1,3 +1,5 @@
+//! Elements against fields whose strains, forces and volumes are known by hand.
+
 mod shape;
 
 use super::kind::{Elements, Points};

@@ -1,3 +1,5 @@
+//! Certified digits of NIST, bounds, and places without an answer.
+
 use super::*;
 use crate::calibration::statistics::Covariance;
 
