@@ -1,6 +1,6 @@
 //! The command line.
 
-use clap::{Parser, Subcommand, ValueEnum};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use law::trial;
 use std::path::PathBuf;
 use workshop::new_law::NewLaw;
@@ -31,89 +31,11 @@ pub(crate) struct Arguments {
 #[derive(Subcommand)]
 pub(crate) enum Command {
     /// Run a case, or all variants of it.
-    Run {
-        /// A case file, or a folder with `case.toml`.
-        case: PathBuf,
-        /// Run only this variant of it.
-        #[arg(long)]
-        variant: Option<String>,
-        /// Override a setting of the file and its variants: KEY is the dotted path, VALUE as in the
-        /// file, such as `solver.max_iterations=40`; may be repeated.
-        #[arg(long, value_name = "KEY=VALUE")]
-        set: Vec<String>,
-        /// Folder for the results [default: results/CASE or results/CASE/VARIANT].
-        #[arg(long)]
-        out: Option<PathBuf>,
-        /// Check everything and compute nothing: `report.html` shows mesh, lines, supports, loads,
-        /// water, initial stress and active groups. A folder with results of a run is refused.
-        #[arg(long, conflicts_with_all = ["resume", "record", "checkpoint"])]
-        dry_run: bool,
-        /// Go on from where an earlier run into the folder was stopped, or start.
-        #[arg(long)]
-        resume: bool,
-        /// Seconds between checkpoints for `--resume`, or 20 times what the last one took if
-        /// longer; 0: after every increment.
-        #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = not_negative)]
-        checkpoint: f64,
-        /// Threads; the results do not depend on it [default: all processors, on a grid of 256 elements or less
-        /// only after 0.1 s].
-        #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
-        threads: Option<u16>,
-        /// Write the arguments of one call of the UMAT to this file, before and after it.
-        #[arg(long, value_name = "FILE")]
-        record: Option<PathBuf>,
-    },
+    Run(Run),
     /// Lead one law at one integration point along a path.
-    Point {
-        /// A driver file, or with `--umat` the `test.inp` of an IncrementalDriver.
-        driver: PathBuf,
-        /// Run input of the IncrementalDriver with this Abaqus user subroutine.
-        #[arg(long, value_name = "LIBRARY", conflicts_with_all = ["variant", "set"])]
-        umat: Option<PathBuf>,
-        /// Run only this variant of it.
-        #[arg(long)]
-        variant: Option<String>,
-        /// Override a setting of the file and its variants: KEY is the dotted path, VALUE as in the
-        /// file, such as `solver.max_iterations=40`; may be repeated.
-        #[arg(long, value_name = "KEY=VALUE")]
-        set: Vec<String>,
-        /// File for the table; standard output if left out.
-        #[arg(long)]
-        csv: Option<PathBuf>,
-        /// Write the arguments of one call of the UMAT to this file, before and after it.
-        #[arg(long, value_name = "FILE")]
-        record: Option<PathBuf>,
-    },
+    Point(Point),
     /// Carry out the runs of a study file, or go on with them.
-    Study {
-        /// A study file, or a folder with `study.toml`.
-        file: PathBuf,
-        /// Folder for the results [default: results/STUDY].
-        #[arg(long)]
-        out: Option<PathBuf>,
-        /// Number of runs at a time, each in a separate process [default: one for each processor].
-        #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
-        jobs: Option<u16>,
-        /// Check everything, write the table of runs and carry out none.
-        #[arg(long, conflicts_with = "run")]
-        plan: bool,
-        /// Carry out this run alone, unless it is done, for programs that distribute work.
-        #[arg(long, value_name = "INDEX", conflicts_with_all = ["jobs", "retry"])]
-        run: Option<usize>,
-        /// Repeat runs that failed.
-        #[arg(long)]
-        retry: bool,
-        /// Forget what was done before.
-        #[arg(long)]
-        anew: bool,
-        /// Seconds between checkpoints for `--resume`, or 20 times what the last one took if
-        /// longer; 0: after every increment.
-        #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = not_negative)]
-        checkpoint: f64,
-        /// Threads of each run; the results do not depend on it [default: 1].
-        #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
-        threads: Option<u16>,
-    },
+    Study(Study),
     /// Write the report of a run or a study, or the comparison of several runs.
     Report {
         /// Results folders.
@@ -133,56 +55,9 @@ pub(crate) enum Command {
         out: Option<PathBuf>,
     },
     /// Measure error against CPU time for many settings of a case or driver.
-    TradeOff {
-        /// A case file, a folder with `case.toml`, or a driver file.
-        input: PathBuf,
-        /// Study only this variant of it.
-        #[arg(long)]
-        variant: Option<String>,
-        /// Override a setting of the file and its variants: KEY is the dotted path, VALUE as in the
-        /// file, such as `solver.max_iterations=40`; may be repeated.
-        #[arg(long, value_name = "KEY=VALUE")]
-        set: Vec<String>,
-        /// Folder for the results [default: `results/trade_off_NAME`].
-        #[arg(long)]
-        out: Option<PathBuf>,
-        /// Divide the mesh of a case by 4 too, not only by 2.
-        #[arg(long)]
-        fine: bool,
-        /// Try all settings of a case, however long one run takes.
-        #[arg(long)]
-        thorough: bool,
-        /// Go on with the study of a case that was stopped.
-        #[arg(long)]
-        resume: bool,
-        /// Most increments per segment of a driver.
-        #[arg(long, default_value_t = 1000)]
-        max_increments: usize,
-        /// Instead: find the stiffness that interfaces without thickness should have.
-        #[arg(long)]
-        interface_stiffness: bool,
-    },
+    TradeOff(TradeOff),
     /// Find parameters of laws from measured curves, with intervals.
-    Calibrate {
-        /// A calibration file.
-        file: PathBuf,
-        /// Carry out only this variant of it.
-        #[arg(long)]
-        variant: Option<String>,
-        /// Override a setting of the file and its variants: KEY is the dotted path, VALUE as in the
-        /// file, such as `starts=20`; may be repeated.
-        #[arg(long, value_name = "KEY=VALUE")]
-        set: Vec<String>,
-        /// Folder for the results [default: `results/calibrate_NAME`].
-        #[arg(long)]
-        out: Option<PathBuf>,
-        /// Forget what an earlier, ended call has computed.
-        #[arg(long)]
-        anew: bool,
-        /// Threads of the runs of cases; the results do not depend on it [default: all processors].
-        #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
-        threads: Option<u16>,
-    },
+    Calibrate(Calibrate),
     /// Check whether a library keeps the contract.
     Check(workshop::check::Arguments),
     /// List the laws found, or show all about one of them.
@@ -255,25 +130,171 @@ pub(crate) enum Command {
     LawWorker,
 }
 
+/// Arguments of `pilum run`.
+#[derive(Args)]
+pub(crate) struct Run {
+    /// A case file, or a folder with `case.toml`.
+    pub(crate) case: PathBuf,
+    /// Run only this variant of it.
+    #[arg(long)]
+    pub(crate) variant: Option<String>,
+    /// Override a setting of the file and its variants: KEY is the dotted path, VALUE as in the
+    /// file, such as `solver.max_iterations=40`; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub(crate) set: Vec<String>,
+    /// Folder for the results [default: results/CASE or results/CASE/VARIANT].
+    #[arg(long)]
+    pub(crate) out: Option<PathBuf>,
+    /// Check everything and compute nothing: `report.html` shows mesh, lines, supports, loads,
+    /// water, initial stress and active groups. A folder with results of a run is refused.
+    #[arg(long, conflicts_with_all = ["resume", "record", "checkpoint"])]
+    pub(crate) dry_run: bool,
+    /// Go on from where an earlier run into the folder was stopped, or start.
+    #[arg(long)]
+    pub(crate) resume: bool,
+    /// Seconds between checkpoints for `--resume`, or 20 times what the last one took if
+    /// longer; 0: after every increment.
+    #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = not_negative)]
+    pub(crate) checkpoint: f64,
+    /// Threads; the results do not depend on it [default: all processors, on a grid of 256 elements or less
+    /// only after 0.1 s].
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) threads: Option<u16>,
+    /// Write the arguments of one call of the UMAT to this file, before and after it.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) record: Option<PathBuf>,
+}
+
+/// Arguments of `pilum point`.
+#[derive(Args)]
+pub(crate) struct Point {
+    /// A driver file, or with `--umat` the `test.inp` of an IncrementalDriver.
+    pub(crate) driver: PathBuf,
+    /// Run input of the IncrementalDriver with this Abaqus user subroutine.
+    #[arg(long, value_name = "LIBRARY", conflicts_with_all = ["variant", "set"])]
+    pub(crate) umat: Option<PathBuf>,
+    /// Run only this variant of it.
+    #[arg(long)]
+    pub(crate) variant: Option<String>,
+    /// Override a setting of the file and its variants: KEY is the dotted path, VALUE as in the
+    /// file, such as `solver.max_iterations=40`; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub(crate) set: Vec<String>,
+    /// File for the table; standard output if left out.
+    #[arg(long)]
+    pub(crate) csv: Option<PathBuf>,
+    /// Write the arguments of one call of the UMAT to this file, before and after it.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) record: Option<PathBuf>,
+}
+
+/// Arguments of `pilum study`.
+#[derive(Args)]
+pub(crate) struct Study {
+    /// A study file, or a folder with `study.toml`.
+    pub(crate) file: PathBuf,
+    /// Folder for the results [default: results/STUDY].
+    #[arg(long)]
+    pub(crate) out: Option<PathBuf>,
+    /// Number of runs at a time, each in a separate process [default: one for each processor].
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) jobs: Option<u16>,
+    /// Check everything, write the table of runs and carry out none.
+    #[arg(long, conflicts_with = "run")]
+    pub(crate) plan: bool,
+    /// Carry out this run alone, unless it is done, for programs that distribute work.
+    #[arg(long, value_name = "INDEX", conflicts_with_all = ["jobs", "retry"])]
+    pub(crate) run: Option<usize>,
+    /// Repeat runs that failed.
+    #[arg(long)]
+    pub(crate) retry: bool,
+    /// Forget what was done before.
+    #[arg(long)]
+    pub(crate) anew: bool,
+    /// Seconds between checkpoints for `--resume`, or 20 times what the last one took if
+    /// longer; 0: after every increment.
+    #[arg(long, value_name = "SECONDS", default_value_t = 1.0, value_parser = not_negative)]
+    pub(crate) checkpoint: f64,
+    /// Threads of each run; the results do not depend on it [default: 1].
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) threads: Option<u16>,
+}
+
+/// Arguments of `pilum trade-off`.
+#[derive(Args)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "switches of the command line"
+)]
+pub(crate) struct TradeOff {
+    /// A case file, a folder with `case.toml`, or a driver file.
+    pub(crate) input: PathBuf,
+    /// Study only this variant of it.
+    #[arg(long)]
+    pub(crate) variant: Option<String>,
+    /// Override a setting of the file and its variants: KEY is the dotted path, VALUE as in the
+    /// file, such as `solver.max_iterations=40`; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub(crate) set: Vec<String>,
+    /// Folder for the results [default: `results/trade_off_NAME`].
+    #[arg(long)]
+    pub(crate) out: Option<PathBuf>,
+    /// Divide the mesh of a case by 4 too, not only by 2.
+    #[arg(long)]
+    pub(crate) fine: bool,
+    /// Try all settings of a case, however long one run takes.
+    #[arg(long)]
+    pub(crate) thorough: bool,
+    /// Go on with the study of a case that was stopped.
+    #[arg(long)]
+    pub(crate) resume: bool,
+    /// Most increments per segment of a driver.
+    #[arg(long, default_value_t = 1000)]
+    pub(crate) max_increments: usize,
+    /// Instead: find the stiffness that interfaces without thickness should have.
+    #[arg(long)]
+    pub(crate) interface_stiffness: bool,
+}
+
+/// Arguments of `pilum calibrate`.
+#[derive(Args)]
+pub(crate) struct Calibrate {
+    /// A calibration file.
+    pub(crate) file: PathBuf,
+    /// Carry out only this variant of it.
+    #[arg(long)]
+    pub(crate) variant: Option<String>,
+    /// Override a setting of the file and its variants: KEY is the dotted path, VALUE as in the
+    /// file, such as `starts=20`; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub(crate) set: Vec<String>,
+    /// Folder for the results [default: `results/calibrate_NAME`].
+    #[arg(long)]
+    pub(crate) out: Option<PathBuf>,
+    /// Forget what an earlier, ended call has computed.
+    #[arg(long)]
+    pub(crate) anew: bool,
+    /// Threads of the runs of cases; the results do not depend on it [default: all processors].
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) threads: Option<u16>,
+}
+
 impl Command {
     /// Whether it calls laws in its own process, which they may end; and whether that may be done
     /// once more with laws in separate processes.
     pub(crate) fn calls_laws(&self) -> Option<bool> {
         match self {
             // What came through a pipe comes only once.
-            Self::Run { case, .. } => Some(case.is_file() || case.is_dir()),
-            Self::Point { driver, csv, .. } => {
-                let goes_into_pipe = csv
-                    .as_ref()
-                    .is_some_and(|csv| csv.exists() && !csv.is_file());
-                Some(driver.is_file() && !goes_into_pipe)
+            Self::Run(Run { case, .. }) => Some(case.is_file() || case.is_dir()),
+            Self::Point(Point { driver, csv, .. }) => {
+                let is_pipe = |csv: &PathBuf| csv.exists() && !csv.is_file();
+                Some(driver.is_file() && !csv.as_ref().is_some_and(is_pipe))
             }
             // One run goes on from its checkpoint.
-            Self::Study { run, .. } => Some(run.is_some()),
-            Self::TradeOff { .. }
-            | Self::Calibrate { .. }
-            | Self::Laws { .. }
-            | Self::Lock { .. } => Some(false),
+            Self::Study(Study { run, .. }) => Some(run.is_some()),
+            Self::TradeOff(_) | Self::Calibrate(_) | Self::Laws { .. } | Self::Lock { .. } => {
+                Some(false)
+            }
             _ => None,
         }
     }

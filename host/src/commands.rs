@@ -3,169 +3,30 @@
 mod cases;
 mod studies;
 
-use crate::arguments::{Arguments, Command, File};
+use crate::arguments::{Arguments, Calibrate, Command, File, Point, TradeOff};
 use crate::output::{print, printing, say};
 use crate::threads;
-use cases::{dry_run_cases, run_cases, write_report};
+use cases::write_report;
 use clap::CommandFactory;
 use input::schema::{self, FileKind};
 use input::{Case, Error};
 use law::foreign::Adapter;
 use law::{Opener, SearchPath, Stop, trial};
-use runs::run::Options;
 use runs::{calibration, supervision, trade_off};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
-use studies::{How, What};
 use text::write::refuse_other;
 
-#[expect(clippy::too_many_lines, reason = "one arm for each command")]
 pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
     match command {
-        Command::Run {
-            case,
-            variant,
-            set,
-            out,
-            dry_run,
-            resume,
-            checkpoint,
-            threads: n_threads,
-            record,
-        } => {
-            threads::gather(n_threads)?;
-            if n_threads.is_some() || dry_run {
-                threads::begin()?;
-            }
-            let options = Options {
-                resume,
-                checkpoints: Some(Duration::from_secs_f64(checkpoint)),
-                ends_without: false,
-                reports: true,
-            };
-            if dry_run {
-                return dry_run_cases(&opener, (&case, &set), variant.as_deref(), out.as_deref());
-            }
-            let stop = stop_on_signals()?;
-            recorded(record.as_deref(), opener, |opener| {
-                run_cases(
-                    opener,
-                    (&case, &set),
-                    variant.as_deref(),
-                    out.as_deref(),
-                    options,
-                    &stop,
-                )
-            })
-        }
-        Command::Point {
-            driver,
-            umat,
-            variant,
-            set,
-            csv,
-            record,
-        } => {
-            let stop = stop_on_signals()?;
-            recorded(record.as_deref(), opener, |opener| {
-                let which = (variant.as_deref(), set.as_slice());
-                let (umat, csv) = (umat.as_deref(), csv.as_deref());
-                run_point(opener, &driver, umat, which, csv, &stop)
-            })
-        }
-        Command::Study {
-            file,
-            out,
-            jobs,
-            plan,
-            run,
-            retry,
-            anew,
-            checkpoint,
-            threads: n_threads,
-        } => {
-            threads::gather(Some(n_threads.unwrap_or(1)))?;
-            threads::begin()?;
-            let what = match run {
-                _ if plan => What::Plan,
-                Some(index) => What::One(index),
-                None => What::All { jobs, retry },
-            };
-            let how = How {
-                anew,
-                checkpoint,
-                threads: n_threads,
-            };
-            let stop = stop_on_signals()?;
-            studies::study(&opener, (&file, out.as_deref()), &what, &how, stop)
-        }
+        Command::Run(asked) => cases::run(&asked, opener),
+        Command::Point(asked) => run_point(&asked, opener),
+        Command::Study(asked) => studies::study(&asked, &opener),
         Command::Report { folders, out } => write_report(&folders, out),
-        Command::Table { folders, out } => {
-            let table = results::run_table::of(&folders)?;
-            match out {
-                None => print(&table),
-                Some(out) => {
-                    std::fs::write(&out, table)
-                        .map_err(|source| text::Error::unwritable(&out, source))?;
-                    print(&format!("table in {}\n", out.display()))
-                }
-            }
-        }
-        Command::TradeOff {
-            input,
-            variant,
-            set,
-            out,
-            fine,
-            thorough,
-            resume,
-            max_increments,
-            interface_stiffness,
-        } => {
-            let options = trade_off::Options {
-                variant,
-                settings: set,
-                out,
-                fine,
-                thorough,
-                resume,
-                most_increments: max_increments,
-                interface_stiffness,
-                stop: stop_on_signals()?,
-                opener,
-            };
-            printing(|out| {
-                let mut show = |text: &str| out.line(text);
-                trade_off::run(&input, &options, &mut show, &mut |doing| {
-                    say!("{doing}");
-                })
-            })
-        }
-        Command::Calibrate {
-            file,
-            variant,
-            set,
-            out,
-            anew,
-            threads: n_threads,
-        } => {
-            threads::gather(n_threads)?;
-            threads::begin()?;
-            let options = calibration::Options {
-                variant,
-                settings: set,
-                out,
-                stop: stop_on_signals()?,
-                opener,
-                anew,
-            };
-            printing(|out| {
-                let mut show = |text: &str| out.line(text);
-                calibration::run(&file, &options, &mut show, &mut |doing| say!("{doing}"))
-            })
-        }
+        Command::Table { folders, out } => write_table(&folders, out.as_deref()),
+        Command::TradeOff(asked) => study_settings(asked, opener),
+        Command::Calibrate(asked) => calibrate(asked, opener),
         Command::Check(arguments) => {
             printing(|out| workshop::check::run(&arguments, &opener, &mut |text| out.text(text)))
         }
@@ -178,22 +39,10 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
         Command::NewLaw(project) => print(&project.write()?),
         Command::NewSidecar(sidecar) => print(&sidecar.write()?),
         Command::Schema { file } => print_schema(file),
-        Command::Completions { shell } => {
-            let mut program = Arguments::command();
-            let mut script = Vec::new();
-            clap_complete::generate(shell, &mut program, "pilum", &mut script);
-            print(&String::from_utf8_lossy(&script))
-        }
+        Command::Completions { shell } => print_completions(shell),
         Command::Man { into: None } => manual(&Arguments::command()),
         Command::Man { into: Some(folder) } => manuals(&folder),
-        Command::Inspect { library, json } => {
-            let inspection = law::inspect::inspect(&library)?;
-            if json {
-                print(&law::inspect::json(&inspection)?)
-            } else {
-                print(&format!("{inspection}\n"))
-            }
-        }
+        Command::Inspect { library, json } => show_library(&library, json),
         Command::Lock { input } => {
             let lock = input::lock::write(&opener, &input)?;
             print(&format!("lock in {}\n", lock.display()))
@@ -213,11 +62,68 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
         Command::LawWorker => Ok(law::isolate::work()?),
         #[cfg(not(unix))]
         Command::LawWorker => Err(Error::usage("there are no workers here")),
-        Command::ProbeLibrary { library, sha256 } => Ok(trial::probe(
-            &library,
-            &sha256,
-            &mut std::io::stdout().lock(),
-        )?),
+        Command::ProbeLibrary { library, sha256 } => {
+            let answer = &mut std::io::stdout().lock();
+            Ok(trial::probe(&library, &sha256, answer)?)
+        }
+    }
+}
+
+fn write_table(folders: &[PathBuf], out: Option<&Path>) -> Result<(), Error> {
+    let table = results::run_table::of(folders)?;
+    let Some(out) = out else {
+        return print(&table);
+    };
+    std::fs::write(out, table).map_err(|source| text::Error::unwritable(out, source))?;
+    print(&format!("table in {}\n", out.display()))
+}
+
+fn study_settings(asked: TradeOff, opener: Opener) -> Result<(), Error> {
+    let options = trade_off::Options {
+        variant: asked.variant,
+        settings: asked.set,
+        out: asked.out,
+        fine: asked.fine,
+        thorough: asked.thorough,
+        resume: asked.resume,
+        most_increments: asked.max_increments,
+        interface_stiffness: asked.interface_stiffness,
+        stop: stop_on_signals()?,
+        opener,
+    };
+    printing(|out| {
+        let mut show = |text: &str| out.line(text);
+        trade_off::run(&asked.input, &options, &mut show, &mut |doing| {
+            say!("{doing}")
+        })
+    })
+}
+
+fn calibrate(asked: Calibrate, opener: Opener) -> Result<(), Error> {
+    threads::gather(asked.threads)?;
+    threads::begin()?;
+    let options = calibration::Options {
+        variant: asked.variant,
+        settings: asked.set,
+        out: asked.out,
+        stop: stop_on_signals()?,
+        opener,
+        anew: asked.anew,
+    };
+    printing(|out| {
+        let mut show = |text: &str| out.line(text);
+        calibration::run(&asked.file, &options, &mut show, &mut |doing| {
+            say!("{doing}")
+        })
+    })
+}
+
+fn show_library(library: &Path, json: bool) -> Result<(), Error> {
+    let inspection = law::inspect::inspect(library)?;
+    if json {
+        print(&law::inspect::json(&inspection)?)
+    } else {
+        print(&format!("{inspection}\n"))
     }
 }
 
@@ -309,25 +215,23 @@ pub(crate) fn cannot_start(what: &str, why: &impl std::fmt::Display) -> Error {
 }
 
 /// Tables go to standard output or files, what came out of each driver to the error stream.
-fn run_point(
-    opener: &Opener,
-    driver: &Path,
-    umat: Option<&Path>,
-    which: (Option<&str>, &[String]),
-    csv: Option<&Path>,
-    stop: &Stop,
-) -> Result<(), Error> {
+fn run_point(asked: &Point, opener: Opener) -> Result<(), Error> {
+    let stop = &stop_on_signals()?;
     let report = |report: &runs::point::PointReport| say!("{report}");
-    match umat {
-        Some(umat) => runs::point::run_incremental(opener, driver, umat, csv, stop, report),
-        None if driver.extension().is_some_and(|ending| ending == "inp") => {
-            Err(Error::usage(format!(
-                "{} is no driver file; `--umat LIBRARY` reads input of the IncrementalDriver",
-                driver.display()
-            )))
+    let (driver, csv) = (&asked.driver, asked.csv.as_deref());
+    let which = (asked.variant.as_deref(), asked.set.as_slice());
+    recorded(asked.record.as_deref(), opener, |opener| {
+        match &asked.umat {
+            Some(umat) => runs::point::run_incremental(opener, driver, umat, csv, stop, report),
+            None if driver.extension().is_some_and(|ending| ending == "inp") => {
+                Err(Error::usage(format!(
+                    "{} is no driver file; `--umat LIBRARY` reads input of the IncrementalDriver",
+                    driver.display()
+                )))
+            }
+            None => runs::point::run_file_until(opener, driver, which, csv, stop, report),
         }
-        None => runs::point::run_file_until(opener, driver, which, csv, stop, report),
-    }
+    })
 }
 
 fn show_laws(
@@ -362,6 +266,12 @@ fn print_schema(file: File) -> Result<(), Error> {
     }))
     .map_err(|error| Error::internal(error.to_string()))?;
     print(&format!("{text}\n"))
+}
+
+fn print_completions(shell: clap_complete::Shell) -> Result<(), Error> {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Arguments::command(), "pilum", &mut script);
+    print(&String::from_utf8_lossy(&script))
 }
 
 /// A manual page for the program and for each command.

@@ -1,7 +1,10 @@
 //! `pilum study`: many runs of one case, or one of them.
 
 use super::cases::write_report;
+use super::stop_on_signals;
+use crate::arguments::Study;
 use crate::output::{print, say};
+use crate::threads;
 use indicatif::{ProgressBar, ProgressStyle};
 use input::Error;
 use law::{Opener, Stop};
@@ -14,63 +17,44 @@ use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Requested part of a study.
-pub(super) enum What {
-    /// The table of runs alone.
-    Plan,
-    /// One run.
-    One(usize),
-    /// All that are not done; those that failed, too.
-    All { jobs: Option<u16>, retry: bool },
-}
-
-/// How it is carried out.
-pub(super) struct How {
-    pub(super) anew: bool,
-    /// Seconds between checkpoints.
-    pub(super) checkpoint: f64,
-    pub(super) threads: Option<u16>,
-}
-
-pub(super) fn study(
-    opener: &Opener,
-    (file, out): (&Path, Option<&Path>),
-    what: &What,
-    how: &How,
-    stop: Stop,
-) -> Result<(), Error> {
-    let plan = Plan::of(file, out, opener)?;
-    match what {
-        What::Plan => {
-            say_warnings(&plan);
-            let record = plan.check()?;
-            let Some(_table) = results::study::take_table(plan.folder())? else {
-                let message = format!(
-                    "{}: another process carries out this study",
-                    plan.folder().display()
-                );
-                return Err(Error::usage(message));
-            };
-            plan.prepare(&record, how.anew)?;
-            let table = plan.folder().join(results::study::TABLE);
-            print(&format!(
-                "{} runs\ntable in {}\n",
-                plan.n_runs(),
-                table.display()
-            ))
-        }
-        What::One(index) => one(&plan, *index, how, stop),
-        What::All { jobs, retry } => {
-            say_warnings(&plan);
-            let jobs = Jobs {
-                at_a_time: jobs.map_or_else(processors, usize::from),
-                retry: *retry,
-                anew: how.anew,
-                arguments: arguments(opener, how),
-            };
-            all(&plan, &jobs, &stop)
-        }
+pub(super) fn study(asked: &Study, opener: &Opener) -> Result<(), Error> {
+    threads::gather(Some(asked.threads.unwrap_or(1)))?;
+    threads::begin()?;
+    let stop = stop_on_signals()?;
+    let plan = Plan::of(&asked.file, asked.out.as_deref(), opener)?;
+    if let Some(index) = asked.run {
+        return one(&plan, index, asked, stop);
     }
+    say_warnings(&plan);
+    if asked.plan {
+        return plan_alone(&plan, asked.anew);
+    }
+    let jobs = Jobs {
+        at_a_time: asked.jobs.map_or_else(processors, usize::from),
+        retry: asked.retry,
+        anew: asked.anew,
+        arguments: arguments(opener, asked),
+    };
+    all(&plan, &jobs, &stop)
+}
+
+/// Checks everything and writes the table of runs.
+fn plan_alone(plan: &Plan, anew: bool) -> Result<(), Error> {
+    let record = plan.check()?;
+    let Some(_table) = results::study::take_table(plan.folder())? else {
+        let message = format!(
+            "{}: another process carries out this study",
+            plan.folder().display()
+        );
+        return Err(Error::usage(message));
+    };
+    plan.prepare(&record, anew)?;
+    let table = plan.folder().join(results::study::TABLE);
+    print(&format!(
+        "{} runs\ntable in {}\n",
+        plan.n_runs(),
+        table.display()
+    ))
 }
 
 fn say_warnings(plan: &Plan) {
@@ -84,10 +68,10 @@ fn processors() -> usize {
 }
 
 /// Arguments of the process of each run.
-fn arguments(opener: &Opener, how: &How) -> Vec<std::ffi::OsString> {
+fn arguments(opener: &Opener, asked: &Study) -> Vec<std::ffi::OsString> {
     let trust = opener.trust();
-    let mut arguments = vec![format!("--checkpoint={}", how.checkpoint)];
-    arguments.extend(how.threads.map(|n| format!("--threads={n}")));
+    let mut arguments = vec![format!("--checkpoint={}", asked.checkpoint)];
+    arguments.extend(asked.threads.map(|n| format!("--threads={n}")));
     if !trust.probe {
         arguments.push("--no-probe".to_owned());
     }
@@ -115,11 +99,11 @@ impl Observer for Quiet {
     }
 }
 
-fn one(plan: &Plan, index: usize, how: &How, stop: Stop) -> Result<(), Error> {
+fn one(plan: &Plan, index: usize, asked: &Study, stop: Stop) -> Result<(), Error> {
     let mut quiet = Quiet(stop_of_worker(stop));
     let once = Once {
-        anew: how.anew,
-        checkpoints: Duration::from_secs_f64(how.checkpoint),
+        anew: asked.anew,
+        checkpoints: Duration::from_secs_f64(asked.checkpoint),
     };
     let run = run_one(plan, index, once, &mut quiet, &mut |_| {})?;
     let what = if run { "done" } else { "done already" };
