@@ -162,7 +162,6 @@ impl Driver {
         let notes = self.notes.iter().cloned();
         let mut warnings: Vec<Warning> = notes.map(Warning::Note).collect();
         let dependence = self.law.time_dependence();
-        let depends = dependence.is_some();
         let says_none = |segment: &Segment| segment.time.is_none();
         let first = self.segments.iter().position(says_none);
         if let (Some(number), Some(by)) = (first, dependence) {
@@ -183,25 +182,34 @@ impl Driver {
             let refusal = search.take_obstacle().refusal;
             return Err(self.refused(refusal.map(|refusal| refusal.message).unwrap_or_default()));
         };
-        let n = self.law.n_components();
-        let scale = self.flux.iter().fold(0.0_f64, |max, v| max.max(v.abs()));
-        let moves = (0..n).any(|i| (returned[i] - self.flux[i]).abs() > OUTSIDE * scale);
         // What a law does in the time of this call is what it is for.
-        if moves && !depends {
-            let moved = Moved {
-                law: self.law.description().id.clone(),
-                hypothesis: self.law.hypothesis(),
-                given: self.flux[..n].to_vec(),
-                returned: returned[..n].to_vec(),
-            };
-            // Those of other programs are given a time in this call, in which they may creep.
-            warnings.push(if self.law.library().foreign().is_some() {
-                Warning::DoesNotLast(moved)
-            } else {
-                Warning::OutsideSurface(moved)
-            });
+        if dependence.is_none() {
+            warnings.extend(self.moved(&returned));
         }
         Ok((point, search, warnings))
+    }
+
+    /// What to say of an initial flux that an update of no size moves.
+    fn moved(&self, returned: &Vector) -> Option<Warning> {
+        let n = self.law.n_components();
+        let (given, returned) = (&self.flux[..n], &returned[..n]);
+        let scale = self.flux.iter().fold(0.0_f64, |max, v| max.max(v.abs()));
+        let mut pairs = returned.iter().zip(given);
+        if !pairs.any(|(returned, given)| (returned - given).abs() > OUTSIDE * scale) {
+            return None;
+        }
+        let moved = Moved {
+            law: self.law.description().id.clone(),
+            hypothesis: self.law.hypothesis(),
+            given: given.to_vec(),
+            returned: returned.to_vec(),
+        };
+        // Those of other programs are given a time in this call, in which they may creep.
+        Some(if self.law.library().foreign().is_some() {
+            Warning::DoesNotLast(moved)
+        } else {
+            Warning::OutsideSurface(moved)
+        })
     }
 
     /// The internal variables that the law gives to the initial flux.

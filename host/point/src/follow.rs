@@ -5,7 +5,7 @@ use crate::error::{Cause, Error, NoEquilibrium, Place, Warning};
 use crate::frame::Frame;
 use crate::increments::{Halt, Walk};
 use crate::path::{Control, Segment};
-use crate::state::{Goal, Point};
+use crate::state::{Goal, Point, Vector};
 use law::{Moment, words};
 
 /// The state at the end of an increment, in the components of the law's hypothesis.
@@ -42,6 +42,151 @@ pub struct Course {
     pub warnings: Vec<Warning>,
 }
 
+/// The path as far as it was followed.
+struct Way<'a> {
+    driver: &'a Driver,
+    walk: Walk<'a>,
+    /// Increments done.
+    increment: usize,
+    /// Time at the end of the last one.
+    time: f64,
+    /// The step.
+    moment: Moment,
+    /// The flux that components without control keep.
+    held: Vector,
+    warnings: Vec<Warning>,
+    strayed: Option<Warning>,
+    blurred: Option<Warning>,
+}
+
+impl Way<'_> {
+    fn row<'a>(&self, point: &'a Point, iterations: usize, is_written: bool) -> Row<'a> {
+        let n = self.driver.law.n_components();
+        Row {
+            increment: self.increment,
+            time: self.time,
+            gradient: &point.gradient[..n],
+            flux: &point.flux[..n],
+            internal: &point.internal,
+            iterations,
+            is_written,
+        }
+    }
+
+    /// Follows a segment.
+    fn follow<E: From<Error>>(
+        &mut self,
+        number: usize,
+        sink: &mut impl FnMut(&Row<'_>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let driver = self.driver;
+        let segment = &driver.segments[number];
+        self.walk.change_frame(segment.frame, &mut self.held);
+        let n = driver.law.n_components();
+        let ramp = self.walk.enter(segment, n, &self.held);
+        if segment.first == 0 {
+            self.moment.step_start = self.time;
+            self.moment.step_length = driver.length_of_step(number);
+        }
+        let (start, share) = (self.time, segment.length() / segment.increments as f64);
+        let mut goal = ramp.from;
+        for k in 1..=segment.increments {
+            let next = ramp.goal(k, segment.increments);
+            let calls = self.walk.search.calls;
+            self.walk.search.moment = Moment {
+                step: segment.step,
+                increment: (segment.first + k) as u32,
+                ..self.moment
+            };
+            let place = Place::Increment {
+                segment: number + 1,
+                increment: k,
+                of: segment.increments,
+                row: self.increment + 1,
+            };
+            let reached = self.walk.advance(&goal, &next, (self.time, share));
+            let point = self.walk.cartesian();
+            self.walk.ignored.increment(place, &point.flux);
+            reached.map_err(|halt| self.failure(halt, place))?;
+            self.look_at(&next, place);
+            self.increment += 1;
+            self.time = start + k as f64 * share;
+            let calls = self.walk.search.calls - calls;
+            sink(&self.row(&point, calls, driver.is_written(number, k)))?;
+            goal = next;
+        }
+        self.hold(segment, &goal);
+        Ok(())
+    }
+
+    /// Notices a point that strayed or is blurred, the first one of each.
+    fn look_at(&mut self, goal: &Goal, place: Place) {
+        if self.blurred.is_none() {
+            self.blurred = self.driver.blurred(&self.walk, goal, place);
+        }
+        if self.strayed.is_none() {
+            self.strayed = self.driver.strayed(&self.walk, place);
+        }
+    }
+
+    /// A flux that was led keeps its goal; what is left of its residual does not pile up.
+    fn hold(&mut self, segment: &Segment, goal: &Goal) {
+        for i in 0..self.driver.law.n_components() {
+            self.held[i] = match segment.control[i] {
+                Control::Keep | Control::Flux(_) | Control::FluxBy(_)
+                    if segment.restrictions.is_none() =>
+                {
+                    goal.flux[i]
+                }
+                _ => self.walk.point.flux[i],
+            };
+        }
+    }
+
+    fn failure(&mut self, halt: Halt, place: Place) -> Error {
+        let (law, mut warnings) = (&self.driver.law, std::mem::take(&mut self.warnings));
+        warnings.extend(self.strayed.take());
+        warnings.extend(self.walk.ignored.warning(law));
+        if self.walk.search.is_without_stiffness() {
+            let law = law.description().id.clone();
+            warnings.push(Warning::NoStiffness { law });
+        }
+        let cause = self.driver.cause(halt);
+        self.driver.failure(place, cause, warnings)
+    }
+
+    /// What came of it at the end.
+    fn course(mut self) -> Course {
+        let (law, mut warnings) = (&self.driver.law, self.warnings);
+        warnings.extend(self.strayed);
+        warnings.extend(self.blurred);
+        warnings.extend(self.walk.ignored.warning(law));
+        self.walk.change_frame(Frame::Cartesian, &mut self.held);
+        // Results that the law calls inaccurate.
+        let (times, first) = self.walk.search.unreliable;
+        warnings.extend((times > 0).then(|| Warning::Unreliable {
+            law: law.description().id.clone(),
+            times,
+            first,
+        }));
+        warnings.extend(law.take_notes().into_iter().map(Warning::Note));
+        let n = law.n_components();
+        let Point {
+            gradient,
+            flux,
+            internal,
+        } = &self.walk.point;
+        let last = gradient[..n].iter().chain(&flux[..n]).chain(internal);
+        Course {
+            increments: self.increment,
+            calls: self.walk.search.calls,
+            cut_backs: self.walk.cut_backs,
+            last: last.copied().collect(),
+            warnings,
+        }
+    }
+}
+
 impl Driver {
     /// Names of gradients, fluxes and internal variables, in this order.
     pub fn columns(&self) -> Vec<String> {
@@ -67,105 +212,23 @@ impl Driver {
         &self,
         mut sink: impl FnMut(&Row<'_>) -> Result<(), E>,
     ) -> Result<Course, E> {
-        let (point, search, mut warnings) = self.start()?;
-        let mut walk = Walk::new(point, search);
-        let (mut strayed, mut blurred) = (None, None);
-        let n = self.law.n_components();
-        let mut row = |point: &Point, (increment, time), iterations, is_written| {
-            sink(&Row {
-                increment,
-                time,
-                gradient: &point.gradient[..n],
-                flux: &point.flux[..n],
-                internal: &point.internal,
-                iterations,
-                is_written,
-            })
-        };
-        row(&walk.point, (0, 0.0), 0, true)?;
-        let mut increment = 0;
-        let mut time = 0.0;
-        let mut moment = Moment::default();
-        let mut held = walk.point.flux;
-        for (number, segment) in self.segments.iter().enumerate() {
-            walk.change_frame(segment.frame, &mut held);
-            let ramp = walk.enter(segment, n, &held);
-            if segment.first == 0 {
-                moment.step_start = time;
-                moment.step_length = self.length_of_step(number);
-            }
-            let (start, share) = (time, segment.length() / segment.increments as f64);
-            let mut goal = ramp.from;
-            for k in 1..=segment.increments {
-                let next = ramp.goal(k, segment.increments);
-                let calls = walk.search.calls;
-                walk.search.moment = Moment {
-                    step: segment.step,
-                    increment: (segment.first + k) as u32,
-                    ..moment
-                };
-                let place = Place::Increment {
-                    segment: number + 1,
-                    increment: k,
-                    of: segment.increments,
-                    row: increment + 1,
-                };
-                let reached = walk.advance(&goal, &next, (time, share));
-                let point = walk.cartesian();
-                if walk.is_ignored {
-                    walk.silence.ignored(place, &point.flux);
-                }
-                if let Err(halt) = reached {
-                    warnings.extend(strayed);
-                    warnings.extend(walk.silence.warning(&self.law));
-                    if walk.search.is_without_stiffness() {
-                        let law = self.law.description().id.clone();
-                        warnings.push(Warning::NoStiffness { law });
-                    }
-                    return Err(self.failure(place, self.cause(halt), warnings).into());
-                }
-                if blurred.is_none() {
-                    blurred = self.blurred(&walk, &next, place);
-                }
-                if strayed.is_none() {
-                    strayed = self.strayed(&walk, place);
-                }
-                increment += 1;
-                time = start + k as f64 * share;
-                let calls = walk.search.calls - calls;
-                row(&point, (increment, time), calls, self.is_written(number, k))?;
-                goal = next;
-            }
-            // A flux that was led keeps its goal; what is left of its residual does not pile up.
-            for i in 0..n {
-                held[i] = match segment.control[i] {
-                    _ if segment.restrictions.is_some() => walk.point.flux[i],
-                    Control::Keep | Control::Flux(_) | Control::FluxBy(_) => goal.flux[i],
-                    Control::Gradient(_) | Control::GradientBy(_) | Control::Stiffness(_) => {
-                        walk.point.flux[i]
-                    }
-                };
-            }
-        }
-        warnings.extend(strayed);
-        warnings.extend(blurred);
-        warnings.extend(walk.silence.warning(&self.law));
-        walk.change_frame(Frame::Cartesian, &mut held);
-        warnings.extend(self.unreliable(&walk));
-        warnings.extend(self.law.take_notes().into_iter().map(Warning::Note));
-        let Point {
-            gradient,
-            flux,
-            internal,
-        } = &walk.point;
-        let last = gradient[..n].iter().chain(&flux[..n]).chain(internal);
-        Ok(Course {
-            increments: increment,
-            calls: walk.search.calls,
-            cut_backs: walk.cut_backs,
-            last: last.copied().collect(),
+        let (point, search, warnings) = self.start()?;
+        let mut way = Way {
+            driver: self,
+            held: point.flux,
+            walk: Walk::new(point, search),
+            increment: 0,
+            time: 0.0,
+            moment: Moment::default(),
             warnings,
-        })
+            strayed: None,
+            blurred: None,
+        };
+        sink(&way.row(&way.walk.point, 0, true))?;
+        for number in 0..self.segments.len() {
+            way.follow(number, &mut sink)?;
+        }
+        Ok(way.course())
     }
 
     /// Whether the increment `k` of a segment is for the table.
@@ -182,16 +245,6 @@ impl Driver {
         let step = segments.first().map(|segment| segment.step);
         let of_step = segments.iter().take_while(|s| Some(s.step) == step);
         of_step.map(Segment::length).sum()
-    }
-
-    /// What to say of results that the law calls inaccurate.
-    fn unreliable(&self, walk: &Walk<'_>) -> Option<Warning> {
-        let (times, first) = &walk.search.unreliable;
-        (*times > 0).then(|| Warning::Unreliable {
-            law: self.law.description().id.clone(),
-            times: *times,
-            first: first.clone(),
-        })
     }
 
     /// What to say of a point that round-off keeps from its goal.

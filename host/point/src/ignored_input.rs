@@ -12,21 +12,26 @@ pub(crate) struct IgnoredInput {
     first: Option<Place>,
     /// In one of them there was a flux.
     has_flux: bool,
+    /// The increment that goes on has one.
+    is_in_increment: bool,
     /// The law answered another step.
     has_answered: bool,
 }
 
 impl IgnoredInput {
-    /// Takes in a step that the law answered.
-    pub(crate) fn answered(&mut self) {
-        self.has_answered = true;
+    /// Takes in a step whose gradient moved: whether the law ignored it.
+    pub(crate) fn step(&mut self, is_ignored: Option<bool>) {
+        self.is_in_increment |= is_ignored == Some(true);
+        self.has_answered |= is_ignored == Some(false);
     }
 
-    /// Takes in an increment with steps that it did not.
-    pub(crate) fn ignored(&mut self, place: Place, flux: &[f64]) {
-        self.first.get_or_insert(place);
-        self.increments += 1;
-        self.has_flux |= flux.iter().any(|value| *value != 0.0);
+    /// Takes in the end of an increment.
+    pub(crate) fn increment(&mut self, place: Place, flux: &[f64]) {
+        if std::mem::take(&mut self.is_in_increment) {
+            self.first.get_or_insert(place);
+            self.increments += 1;
+            self.has_flux |= flux.iter().any(|value| *value != 0.0);
+        }
     }
 
     /// What the user should know. Without stress a contact that is open answers nothing either, as

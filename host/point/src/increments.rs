@@ -84,19 +84,46 @@ pub(crate) struct Ramp {
 impl Ramp {
     /// The goal of increment k of n, the last one without rounding.
     pub(crate) fn goal(&self, k: usize, n: usize) -> Goal {
-        if k == n {
-            self.to
-        } else {
-            between(&self.from, &self.to, k as f64 / n as f64)
-        }
+        between(&self.from, &self.to, k as f64 / n as f64)
     }
 }
 
 fn between(from: &Goal, to: &Goal, fraction: f64) -> Goal {
+    if fraction >= 1.0 {
+        return *to;
+    }
     let on_line = |a: &Vector, b: &Vector| std::array::from_fn(|i| a[i] + (b[i] - a[i]) * fraction);
     Goal {
         gradient: on_line(&from.gradient, &to.gradient),
         flux: on_line(&from.flux, &to.flux),
+    }
+}
+
+/// Fraction of an increment that the next step tries.
+struct StepSize {
+    fraction: f64,
+    /// The last step was not a second try.
+    may_grow: bool,
+}
+
+impl StepSize {
+    /// The end of a step from there, without a crumb behind it.
+    fn end_of_step(&self, done: f64) -> f64 {
+        let end = done + self.fraction;
+        if end > 1.0 - SMALLEST_STEP { 1.0 } else { end }
+    }
+
+    fn grow(&mut self) {
+        if self.may_grow {
+            self.fraction = (2.0 * self.fraction).min(1.0);
+        }
+        self.may_grow = true;
+    }
+
+    /// After a step of this length failed; the law may have asked for a factor.
+    fn cut(&mut self, length: f64, factor: Option<f64>) {
+        self.fraction = factor.map_or(0.5, |f| f.clamp(0.1, 0.9)) * length;
+        self.may_grow = false;
     }
 }
 
@@ -110,9 +137,7 @@ pub(crate) struct Walk<'a> {
     /// Fraction of the increment that the first step tries.
     first_step: f64,
     pub(crate) cut_backs: usize,
-    /// The law took no notice of a step of the last increment.
-    pub(crate) is_ignored: bool,
-    pub(crate) silence: IgnoredInput,
+    pub(crate) ignored: IgnoredInput,
 }
 
 impl<'a> Walk<'a> {
@@ -124,8 +149,7 @@ impl<'a> Walk<'a> {
             rate: None,
             first_step: 1.0,
             cut_backs: 0,
-            is_ignored: false,
-            silence: IgnoredInput::default(),
+            ignored: IgnoredInput::default(),
         }
     }
 
@@ -196,33 +220,32 @@ impl<'a> Walk<'a> {
         }))
     }
 
-    /// Carries the point over one increment, in as many steps as it takes.
-    /// `period`: its start and its length.
+    /// Takes the step found, which is this fraction of the increment.
+    fn commit(&mut self, length: f64) {
+        let before = self.point.gradient;
+        self.search.commit(&mut self.point);
+        let after = &self.point.gradient;
+        self.rate = Some(std::array::from_fn(|i| (after[i] - before[i]) / length));
+    }
+
+    /// Carries the point over one increment, given its start and its length, in as many steps as it takes.
     pub(crate) fn advance(
         &mut self,
         from: &Goal,
         to: &Goal,
-        period: (f64, f64),
+        (time, time_increment): (f64, f64),
     ) -> Result<(), Halt> {
-        let (time, time_increment) = period;
         let first_call = self.search.calls;
         self.search.anchor(to);
-        self.is_ignored = false;
         let mut done = 0.0;
-        let mut size = self.first_step;
-        let mut may_grow = true;
+        let mut size = StepSize {
+            fraction: self.first_step,
+            may_grow: true,
+        };
         while done < 1.0 {
-            let end = if done + size > 1.0 - SMALLEST_STEP {
-                1.0
-            } else {
-                done + size
-            };
+            let end = size.end_of_step(done);
             let length = end - done;
-            let goal = if end < 1.0 {
-                between(from, to, end)
-            } else {
-                *to
-            };
+            let goal = between(from, to, end);
             let step = Step {
                 start: &self.point,
                 goal: &goal,
@@ -231,42 +254,28 @@ impl<'a> Walk<'a> {
             };
             let guess = self.rate.map(|rate| rate.map(|rate| rate * length));
             if self.search.find(&step, guess.as_ref())? {
-                match self.search.is_ignored(&step)? {
-                    Some(true) => self.is_ignored = true,
-                    Some(false) => self.silence.answered(),
-                    None => {}
-                }
-                let before = self.point.gradient;
-                self.search.commit(&mut self.point);
-                let after = &self.point.gradient;
-                self.rate = Some(std::array::from_fn(|i| (after[i] - before[i]) / length));
+                self.ignored.step(self.search.is_ignored(&step)?);
+                self.commit(length);
                 done = end;
-                if may_grow {
-                    size = (2.0 * size).min(1.0);
-                }
-                may_grow = true;
+                size.grow();
                 continue;
             }
             if self.search.stop.is_asked() {
                 return Err(Halt::Asked);
             }
             let obstacle = self.search.take_obstacle();
-            let factor = obstacle.factor.map_or(0.5, |f| f.clamp(0.1, 0.9));
-            size = factor * length;
-            may_grow = false;
+            size.cut(length, obstacle.factor);
             self.cut_backs += 1;
-            if size < SMALLEST_STEP || self.search.calls - first_call > MAX_CALLS {
+            if size.fraction < SMALLEST_STEP || self.search.calls - first_call > MAX_CALLS {
                 return Err(Self::shortfall(done, to, obstacle));
             }
         }
-        self.first_step = size;
-        match self.search.unmet(&self.point, to) {
-            None => Ok(()),
-            Some(miss) => {
-                let mut obstacle = self.search.take_obstacle();
-                obstacle.miss = Some(miss);
-                Err(Self::shortfall(1.0, to, obstacle))
-            }
+        self.first_step = size.fraction;
+        let miss = self.search.unmet(&self.point, to);
+        if miss.is_none() {
+            return Ok(());
         }
+        let obstacle = self.search.take_obstacle();
+        Err(Self::shortfall(1.0, to, Obstacle { miss, ..obstacle }))
     }
 }

@@ -32,7 +32,7 @@ use crate::state::{Goal, N_MAX, Point, Step, Vector};
 use crate::tolerance_scale::ToleranceScale;
 use abi::status::Outcome;
 use acceptance::Verdict;
-use law::{BatchFailure, End, Law, Moment, Operator, Start, Stop, Strided};
+use law::{BatchFailure, BatchSuccess, End, Law, Moment, Operator, Start, Stop, Strided};
 use norm::{largest, same};
 use std::mem::swap;
 
@@ -330,58 +330,59 @@ impl<'a> Search<'a> {
         self.calls += 1;
         match self.law.integrate(&start, operator, end) {
             Ok(success) => {
-                if let Some((_, message)) = success.unreliable {
-                    if self.unreliable.0 == 0 {
-                        self.unreliable.1 = message;
-                    }
-                    self.unreliable.0 += 1;
-                }
-                self.trial.point.gradient = gradient;
-                self.trial.point.flux = frame.flux(&self.trial.point.flux);
-                if operator != Operator::None {
-                    frame.operator(&mut self.trial.operator);
-                    if let Some((restrictions, _)) = &self.restricted {
-                        restrictions.operator(&mut self.trial.operator);
-                    }
-                }
+                self.take_answer(gradient, operator, success);
                 self.assess(step);
                 Ok(true)
             }
             Err(failure) => match failure.outcome {
                 Outcome::CutStep | Outcome::Domain | Outcome::Numeric => {
-                    let smallest = self.obstacle.factor.unwrap_or(1.0);
-                    self.obstacle.factor = failure
-                        .factor
-                        .map(|f| f.min(smallest))
-                        .or(self.obstacle.factor);
-                    self.obstacle.refusal = Some(Box::new(failure));
+                    self.obstacle.refused(failure);
                     Ok(false)
                 }
-                Outcome::Unsupported if self.do_without(operator) => {
-                    let other = if operator == Operator::Elastic {
-                        self.relaxation
-                    } else {
-                        self.tangent
-                    };
-                    self.evaluate(step, gradient, other)
-                }
+                Outcome::Unsupported => match self.other_than(operator) {
+                    Some(other) => self.evaluate(step, gradient, other),
+                    None => Err(Box::new(failure)),
+                },
                 _ => Err(Box::new(failure)),
             },
         }
     }
 
-    /// The law may offer one operator only. `false`: there is nothing left to fall back on.
-    fn do_without(&mut self, operator: Operator) -> bool {
+    /// Takes in the law's answer, in the components of points and goals.
+    fn take_answer(&mut self, gradient: Vector, operator: Operator, success: BatchSuccess) {
+        if let Some((_, message)) = success.unreliable {
+            if self.unreliable.0 == 0 {
+                self.unreliable.1 = message;
+            }
+            self.unreliable.0 += 1;
+        }
+        let Sample {
+            point,
+            operator: matrix,
+            ..
+        } = &mut self.trial;
+        point.gradient = gradient;
+        point.flux = self.frame.flux(&point.flux);
+        if operator != Operator::None {
+            self.frame.operator(matrix);
+            if let Some((restrictions, _)) = &self.restricted {
+                restrictions.operator(matrix);
+            }
+        }
+    }
+
+    /// The law may offer one operator only: the one to fall back on, if there is one left.
+    fn other_than(&mut self, operator: Operator) -> Option<Operator> {
         match operator {
             Operator::Consistent if self.relaxation == Operator::Elastic => {
                 self.tangent = Operator::Elastic;
-                true
+                Some(self.tangent)
             }
             Operator::Elastic if self.tangent == Operator::Consistent => {
                 self.relaxation = Operator::Consistent;
-                true
+                Some(self.relaxation)
             }
-            _ => false,
+            _ => None,
         }
     }
 }

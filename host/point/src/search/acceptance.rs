@@ -38,18 +38,14 @@ impl Search<'_> {
         }
     }
 
-    /// Residual of the trial sample, and how near it is.
-    pub(super) fn assess(&mut self, step: &Step<'_>) {
-        let (answer, at_start) = (self.answer(&self.trial.point), self.answer(step.start));
-        let sample = &mut self.trial;
-        let (flux, gradient) = (&sample.point.flux[..self.n], &sample.point.gradient);
+    /// The flux and the gradient that the tolerances of the trial sample are relative to.
+    fn scale_and_reach(&self, step: &Step<'_>, springs: &Vector) -> (f64, f64) {
+        let Point { flux, gradient, .. } = &self.trial.point;
         let start_reach = largest(&step.start.gradient[..self.n]);
-        let mut found = largest(flux).max(largest(&step.start.flux[..self.n]));
+        let mut found = largest(&flux[..self.n]).max(largest(&step.start.flux[..self.n]));
         let mut asked = 0.0_f64;
-        let mut springs = [0.0; N_MAX];
-        for (k, &i) in self.free[..self.n_free].iter().enumerate() {
-            springs[k] = self.stiffness[i] * (gradient[i] - self.origin[i]);
-            found = found.max(f64::abs(springs[k]));
+        for (spring, &i) in springs.iter().zip(&self.free[..self.n_free]) {
+            found = found.max(spring.abs());
             asked = asked.max(step.goal.flux[i].abs());
         }
         // A free component that runs away must not widen its own tolerance: neither in this step
@@ -58,7 +54,18 @@ impl Search<'_> {
         let likely = 10.0 * (start_reach + largest(&step.goal.gradient[..self.n]))
             + 1e3 * scale / self.elastic_norm.max(f64::MIN_POSITIVE);
         let reach = start_reach.max(largest(&gradient[..self.n]).min(likely));
-        let reach = self.anchor.reach_of(reach);
+        (scale, self.anchor.reach_of(reach))
+    }
+
+    /// Residual of the trial sample, and how near it is.
+    pub(super) fn assess(&mut self, step: &Step<'_>) {
+        let (answer, at_start) = (self.answer(&self.trial.point), self.answer(step.start));
+        let mut springs = [0.0; N_MAX];
+        for (k, &i) in self.free[..self.n_free].iter().enumerate() {
+            springs[k] = self.stiffness[i] * (self.trial.point.gradient[i] - self.origin[i]);
+        }
+        let (scale, reach) = self.scale_and_reach(step, &springs);
+        let sample = &mut self.trial;
         let mut verdict = Verdict::Tight;
         let mut worst = 0.0;
         let mut miss = None;

@@ -34,6 +34,13 @@ pub(crate) struct Obstacle {
 }
 
 impl Obstacle {
+    /// The law refused an update.
+    pub(super) fn refused(&mut self, failure: BatchFailure) {
+        let smallest = self.factor.unwrap_or(1.0);
+        self.factor = failure.factor.map(|f| f.min(smallest)).or(self.factor);
+        self.refusal = Some(Box::new(failure));
+    }
+
     /// Whether the stiffness of a component is controlled, not its flux.
     pub(crate) fn is_sprung(&self, component: usize) -> bool {
         self.stiffness[component] > 0.0
