@@ -211,6 +211,15 @@ impl LoadedLaw {
         })
     }
 
+    fn missing(&self, declared: &ParameterDescription) -> BuildFailure {
+        let missing = BuildCause::Missing {
+            unit: declared.unit.clone(),
+            doc: declared.doc.clone(),
+            needed: needed(self.description()),
+        };
+        self.failure(Some(&declared.id), missing)
+    }
+
     /// Values of all parameters in declared order, each held against what the law says of it, and what is unusual
     /// about them, in words. The law is not called.
     ///
@@ -247,14 +256,7 @@ impl LoadedLaw {
                 None => match declared.default {
                     Some(default) => default,
                     None if declared.optional => f64::NAN,
-                    None => {
-                        let missing = BuildCause::Missing {
-                            unit: declared.unit.clone(),
-                            doc: declared.doc.clone(),
-                            needed: needed(description),
-                        };
-                        return Err(self.failure(Some(&declared.id), missing));
-                    }
+                    None => return Err(self.missing(declared)),
                 },
             };
             used.push(UsedParameter {

@@ -270,10 +270,9 @@ pub(crate) fn each_point(
             gradient: (&gradient, rows),
             gradient_end: (&gradient_end, rows),
             flux: (&flux, rows),
-            state: if start.state.is_empty() {
-                &[]
-            } else {
-                &start.state[point * n_states..][..n_states]
+            state: match start.state {
+                [] => &[],
+                all => &all[point * n_states..][..n_states],
             },
             sites: &sites,
             ..*start
@@ -285,7 +284,7 @@ pub(crate) fn each_point(
         };
         its_end.state.fill(0.0);
         its_end.operator.fill(0.0);
-        let status = match update(&one, &mut its_end) {
+        outcomes.status[point] = match update(&one, &mut its_end) {
             Ok(()) => raw::PILUM_OK,
             Err(refusal) => {
                 outcomes.factor[point] = refusal.factor;
@@ -296,15 +295,18 @@ pub(crate) fn each_point(
                 refusal.status
             }
         };
-        outcomes.status[point] = status;
-        let (values, place) = &mut end.flux;
-        if !values.is_empty() {
-            for (c, value) in flux_end.iter().enumerate() {
-                values[place.at(point, c)] = *value;
-            }
-        }
+        scatter(&flux_end, point, &mut end.flux);
     }
     worst
+}
+
+/// Values of a point to their place, if there is one.
+fn scatter(values: &[f64], point: usize, (all, place): &mut (&mut [f64], Strided)) {
+    if !all.is_empty() {
+        for (c, value) in values.iter().enumerate() {
+            all[place.at(point, c)] = *value;
+        }
+    }
 }
 
 /// The values of a point; nothing where there are none.

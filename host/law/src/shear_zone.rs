@@ -310,30 +310,19 @@ impl ZoneInstance {
         answer
     }
 
-    fn integrate(
-        &self,
-        room: &mut Room,
-        operator: Operator,
-        (start, end, outcomes): Batch<'_, '_>,
-    ) -> Option<Answer> {
-        let (n, n_states, points) = (self.n, self.n_states, start.n_points);
-        let n_all = self.n_all();
-        let rows = Strided::rows(n);
-        let strain = unwritten(&mut room.strain, points * n);
-        let strain_end = unwritten(&mut room.strain_end, points * n);
-        for (strain, jump) in [
-            (&mut *strain, start.gradient),
-            (&mut *strain_end, start.gradient_end),
-        ] {
-            strain.fill(0.0);
-            for (i, strain) in strain.chunks_exact_mut(n).enumerate() {
-                for (c, place) in OF_INTERFACE.into_iter().enumerate() {
-                    strain[place] = value(jump, i, c) / self.zone.thickness;
-                }
+    /// Strains of all points from their jumps.
+    fn strain(&self, jump: (&[f64], Strided), strain: &mut [f64]) {
+        strain.fill(0.0);
+        for (i, strain) in strain.chunks_exact_mut(self.n).enumerate() {
+            for (c, place) in OF_INTERFACE.into_iter().enumerate() {
+                strain[place] = value(jump, i, c) / self.zone.thickness;
             }
         }
-        let stress = unwritten(&mut room.stress, points * n);
-        let state = unwritten(&mut room.state, points * n_states);
+    }
+
+    /// Stresses and internal variables of the law, from tractions and all variables.
+    fn start_of_law(&self, start: &Start<'_>, stress: &mut [f64], state: &mut [f64]) {
+        let (n, n_states, n_all) = (self.n, self.n_states, self.n_all());
         for (i, stress) in stress.chunks_exact_mut(n).enumerate() {
             let (law, own) = start.state[i * n_all..][..n_all].split_at(n_states);
             state[i * n_states..][..n_states].copy_from_slice(law);
@@ -344,6 +333,52 @@ impl ZoneInstance {
                 stress[place] = *own;
             }
         }
+    }
+
+    /// The same back.
+    fn end_of_zone(&self, end: &mut End<'_>, stress: &[f64], state: &[f64]) {
+        let (n, n_states, n_all) = (self.n, self.n_states, self.n_all());
+        let (flux, place) = &mut end.flux;
+        for (i, stress) in stress.chunks_exact(n).enumerate() {
+            let (law, own) = end.state[i * n_all..][..n_all].split_at_mut(n_states);
+            law.copy_from_slice(&state[i * n_states..][..n_states]);
+            for (own, place) in own.iter_mut().zip(self.own()) {
+                *own = stress[place];
+            }
+            for (c, of_solid) in OF_INTERFACE.into_iter().enumerate() {
+                flux[place.at(i, c)] = stress[of_solid];
+            }
+        }
+    }
+
+    fn operator_of_zone(&self, solid: &[f64], zone: &mut [f64]) {
+        let n = self.n;
+        let entries = zone.chunks_exact_mut(OF_INTERFACE.len().pow(2));
+        for (entries, solid) in entries.zip(solid.chunks_exact(n * n)) {
+            let places = OF_INTERFACE
+                .into_iter()
+                .flat_map(|row| OF_INTERFACE.map(|column| row * n + column));
+            for (entry, of_solid) in entries.iter_mut().zip(places) {
+                *entry = solid[of_solid] / self.zone.thickness;
+            }
+        }
+    }
+
+    fn integrate(
+        &self,
+        room: &mut Room,
+        operator: Operator,
+        (start, end, outcomes): Batch<'_, '_>,
+    ) -> Option<Answer> {
+        let (n, n_states, points) = (self.n, self.n_states, start.n_points);
+        let rows = Strided::rows(n);
+        let strain = unwritten(&mut room.strain, points * n);
+        let strain_end = unwritten(&mut room.strain_end, points * n);
+        self.strain(start.gradient, strain);
+        self.strain(start.gradient_end, strain_end);
+        let stress = unwritten(&mut room.stress, points * n);
+        let state = unwritten(&mut room.state, points * n_states);
+        self.start_of_law(start, stress, state);
         let stress_end = unwritten(&mut room.stress_end, points * n);
         let state_end = unwritten(&mut room.state_end, points * n_states);
         let matrix = unwritten(&mut room.operator, points * operator.n_entries(n));
@@ -361,29 +396,9 @@ impl ZoneInstance {
         };
         let batch = (&inner, &mut inner_end, outcomes);
         let answer = self.law.call(Request::Update(operator), batch);
-        let (flux, place) = &mut end.flux;
-        for i in 0..points {
-            let stress_end = &stress_end[i * n..][..n];
-            let (law, own) = end.state[i * n_all..][..n_all].split_at_mut(n_states);
-            law.copy_from_slice(&state_end[i * n_states..][..n_states]);
-            for (own, place) in own.iter_mut().zip(self.own()) {
-                *own = stress_end[place];
-            }
-            for (c, of_solid) in OF_INTERFACE.into_iter().enumerate() {
-                flux[place.at(i, c)] = stress_end[of_solid];
-            }
-        }
-        if operator == Operator::None {
-            return answer;
-        }
-        let entries = end.operator.chunks_exact_mut(OF_INTERFACE.len().pow(2));
-        for (entries, solid) in entries.zip(matrix.chunks_exact(n * n)) {
-            let places = OF_INTERFACE
-                .into_iter()
-                .flat_map(|row| OF_INTERFACE.map(|column| row * n + column));
-            for (entry, of_solid) in entries.iter_mut().zip(places) {
-                *entry = solid[of_solid] / self.zone.thickness;
-            }
+        self.end_of_zone(end, stress_end, state_end);
+        if operator != Operator::None {
+            self.operator_of_zone(matrix, end.operator);
         }
         answer
     }

@@ -195,7 +195,8 @@ impl Inspection {
         (self.from_pilum, self.missing) = (suppliers.ours, suppliers.missing);
     }
 
-    fn remarks(&self, file: &File<'_>) -> Vec<String> {
+    /// What this system cannot load.
+    fn mismatches(&self, file: &File<'_>) -> Vec<String> {
         let mut remarks = Vec::new();
         let ours = std::env::consts::ARCH;
         if self.architecture != ours {
@@ -218,6 +219,11 @@ impl Inspection {
         if file.kind() != object::ObjectKind::Dynamic {
             remarks.push(format!("it is no shared library: {:?}", file.kind()));
         }
+        remarks
+    }
+
+    fn remarks(&self, file: &File<'_>) -> Vec<String> {
+        let mut remarks = self.mismatches(file);
         match &self.handshake {
             None if self.is_umat() => remarks.push(match foreign::sidecar_of(&self.path) {
                 Some(sidecar) => {
@@ -372,7 +378,31 @@ pub fn manifest<'data>(file: &File<'data, impl ReadRef<'data>>) -> Option<Vec<Ma
     })
 }
 
-/// The bytes of the block that the file exports as `pilum_magic`.
+/// The numbers of the block, but its text.
+fn magic_block(bytes: &[u8], is_little_endian: bool) -> MagicBlock {
+    let number = |at: usize, n: usize| {
+        let bytes = &bytes[at..at + n];
+        let digit = |all: u64, byte: &u8| all << 8 | u64::from(*byte);
+        if is_little_endian {
+            bytes.iter().rev().fold(0, digit)
+        } else {
+            bytes.iter().fold(0, digit)
+        }
+    };
+    MagicBlock {
+        struct_size: number(0, 4) as u32,
+        magic: number(4, 4) as u32,
+        abi_major: number(8, 2) as u16,
+        abi_minor: number(10, 2) as u16,
+        pointer_bytes: bytes[12],
+        real_bytes: bytes[13],
+        reserved: [0; 2],
+        layout_hash: number(16, 8),
+        sdk: [0; 40],
+    }
+}
+
+/// The block that the file exports as `pilum_magic`.
 fn handshake(file: &File<'_>) -> Option<Handshake> {
     let named = |symbol: &object::Symbol<'_, '_>| {
         symbol.is_definition()
@@ -393,31 +423,8 @@ fn handshake(file: &File<'_>) -> Option<Handshake> {
     let bytes = file
         .sections()
         .find_map(|section| section.data_range(address, 64).ok().flatten())?;
-    let big = !file.is_little_endian();
-    let number = |at: usize, n: usize| {
-        let bytes = &bytes[at..at + n];
-        let digit = |all: u64, byte: &u8| all << 8 | u64::from(*byte);
-        if big {
-            bytes.iter().fold(0, digit)
-        } else {
-            bytes.iter().rev().fold(0, digit)
-        }
-    };
-    let mut block = MagicBlock {
-        struct_size: number(0, 4) as u32,
-        magic: number(4, 4) as u32,
-        abi_major: number(8, 2) as u16,
-        abi_minor: number(10, 2) as u16,
-        pointer_bytes: bytes[12],
-        real_bytes: bytes[13],
-        reserved: [0; 2],
-        layout_hash: number(16, 8),
-        sdk: [0; 40],
-    };
+    let block = magic_block(bytes, file.is_little_endian());
     let sdk = &bytes[24..64];
-    for (to, from) in block.sdk.iter_mut().zip(sdk) {
-        *to = *from as std::ffi::c_char;
-    }
     let sdk: Vec<u8> = sdk.iter().copied().take_while(|&byte| byte != 0).collect();
     (block.magic == raw::PILUM_MAGIC || block.magic == raw::PILUM_MAGIC.swap_bytes()).then(|| {
         Handshake {

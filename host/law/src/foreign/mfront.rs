@@ -250,64 +250,81 @@ impl Reader<'_> {
         modelling: &str,
         index: u32,
     ) -> Result<(FormulationDescription, Vec<Slot>, Vec<ParameterDescription>), String> {
-        let unreadable = |what: &str| format!("its {what} cannot be read");
-        let mut parameters = Vec::new();
-        let mut slots = Vec::new();
-        let mut push = |slot, parameter| {
-            slots.push(slot);
-            parameters.push(parameter);
+        let (slots, parameters) = self.inputs(modelling)?.into_iter().unzip();
+        let formulation = FormulationDescription {
+            hypothesis: hypothesis.name(),
+            index,
+            internal_variables: self.internal_variables(modelling, hypothesis)?,
+            ..FormulationDescription::default()
         };
+        Ok((formulation, slots, parameters))
+    }
+
+    /// What is given from outside, each with its place, in the order of the interface.
+    fn inputs(&self, modelling: &str) -> Result<Vec<(Slot, ParameterDescription)>, String> {
+        let mut inputs = Vec::new();
+        let parameter = |name: &str, default| self.parameter(modelling, name, default);
         if self.number(modelling, "requiresStiffnessTensor") != 0 {
             if self.number("", "ElasticSymmetryType") != 0 {
                 return Err("it wants an orthotropic stiffness".to_owned());
             }
             for name in ["YoungModulus", "PoissonRatio"] {
-                push(Slot::Property, self.parameter(modelling, name, None));
+                inputs.push((Slot::Property, parameter(name, None)));
             }
         }
         if self.number(modelling, "requiresThermalExpansionCoefficientTensor") != 0 {
-            push(
-                Slot::Property,
-                self.parameter(modelling, "ThermalExpansion", None),
-            );
+            inputs.push((Slot::Property, parameter("ThermalExpansion", None)));
         }
-        let properties = self.variables(modelling, "MaterialProperties");
-        for (name, _) in properties.ok_or_else(|| unreadable("material properties"))? {
-            push(Slot::Property, self.parameter(modelling, &name, None));
+        for (name, _) in self.listed(modelling, "MaterialProperties", "material properties")? {
+            inputs.push((Slot::Property, parameter(&name, None)));
         }
         let removed = format!("{}_TemperatureRemovedFromExternalStateVariables", self.name);
         if self.symbols.number(&removed).unwrap_or(1) != 0 {
-            let temperature = self.parameter(modelling, "Temperature", Some(TEMPERATURE));
-            push(Slot::External, temperature);
+            let temperature = parameter("Temperature", Some(TEMPERATURE));
+            inputs.push((Slot::External, temperature));
         }
-        let external = self.variables(modelling, "ExternalStateVariables");
-        for (name, kind) in external.ok_or_else(|| unreadable("external state variables"))? {
+        let external = "external state variables";
+        for (name, kind) in self.listed(modelling, "ExternalStateVariables", external)? {
             if kind != 0 {
                 return Err(format!("its external state variable {name} is no scalar"));
             }
             let default = (name == "Temperature").then_some(TEMPERATURE);
-            push(Slot::External, self.parameter(modelling, &name, default));
+            inputs.push((Slot::External, parameter(&name, default)));
         }
-        let own = self.variables(modelling, "Parameters");
-        for (name, kind) in own.ok_or_else(|| unreadable("parameters"))? {
+        for (name, kind) in self.listed(modelling, "Parameters", "parameters")? {
             let default = self.symbol(modelling, &format!("{name}_ParameterDefaultValue"));
             // Whole numbers steer the algorithm.
             if kind == 0 {
                 let default = self.symbols.real(&default).filter(|v| !v.is_nan());
-                let parameter = ParameterDescription {
-                    // Not given, it is left as it is.
-                    optional: default.is_none(),
-                    ..self.parameter(modelling, &name, default)
-                };
-                push(
-                    Slot::Parameter(name, default.unwrap_or(f64::NAN).to_bits()),
-                    parameter,
-                );
+                let mut parameter = parameter(&name, default);
+                // Not given, it is left as it is.
+                parameter.optional = default.is_none();
+                let bits = default.unwrap_or(f64::NAN).to_bits();
+                inputs.push((Slot::Parameter(name, bits), parameter));
             }
         }
+        Ok(inputs)
+    }
+
+    /// Names and types of a list of variables.
+    fn listed(
+        &self,
+        modelling: &str,
+        list: &str,
+        what: &str,
+    ) -> Result<Vec<(String, i32)>, String> {
+        let variables = self.variables(modelling, list);
+        variables.ok_or_else(|| format!("its {what} cannot be read"))
+    }
+
+    fn internal_variables(
+        &self,
+        modelling: &str,
+        hypothesis: Hypothesis,
+    ) -> Result<Vec<InternalVariable>, String> {
         let mut internal_variables = Vec::new();
-        let states = self.variables(modelling, "InternalStateVariables");
-        for (name, kind) in states.ok_or_else(|| unreadable("internal state variables"))? {
+        let internal = "internal state variables";
+        for (name, kind) in self.listed(modelling, "InternalStateVariables", internal)? {
             let components = components(kind, hypothesis)
                 .ok_or_else(|| format!("its internal state variable {name} is of type {kind}"))?;
             internal_variables.extend(components.iter().map(|component| {
@@ -325,13 +342,7 @@ impl Reader<'_> {
                 }
             }));
         }
-        let formulation = FormulationDescription {
-            hypothesis: hypothesis.name(),
-            index,
-            internal_variables,
-            ..FormulationDescription::default()
-        };
-        Ok((formulation, slots, parameters))
+        Ok(internal_variables)
     }
 
     /// Physical bounds are never left; ordinary ones are those of the law's fit.

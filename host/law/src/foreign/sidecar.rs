@@ -146,33 +146,7 @@ impl Sidecar {
             variables.extend(components(source, internal)?);
         }
         columns(source, &file.internal)?;
-        let mut formulations = Vec::new();
-        let mut ntens = Vec::new();
-        let hypotheses = file.hypotheses.get_ref();
-        if hypotheses.is_empty() {
-            let names = Hypothesis::ALL.map(Hypothesis::name).join(", ");
-            return Err(source
-                .error(file.hypotheses.span(), "`hypotheses` is empty")
-                .hint(format!("name those that the routine is made for: {names}"))
-                .into());
-        }
-        for name in hypotheses {
-            let hypothesis = hypothesis(source, name)?;
-            ntens.push(called_with(source, &file, name, hypothesis)?);
-            formulations.push(FormulationDescription {
-                hypothesis: hypothesis.name(),
-                index: formulations.len() as u32,
-                symmetric: file.symmetric,
-                tangent: match file.tangent {
-                    Given::Consistent => Tangent::Consistent,
-                    Given::Approximate => Tangent::Approximate,
-                },
-                time_dependent: file.time_dependent,
-                internal_variables: variables.clone(),
-                ..FormulationDescription::default()
-            });
-        }
-        unique(source, hypotheses.iter(), "hypothesis")?;
+        let (formulations, ntens) = formulations(source, &file, &variables)?;
         let id = identifier(source, &file.id, "the law")?;
         let cmname = file.cmname.as_ref().map_or(&id, Spanned::get_ref);
         if cmname.len() > CMNAME || !cmname.is_ascii() {
@@ -202,6 +176,42 @@ impl Sidecar {
             law: law.completed(),
         })
     }
+}
+
+/// The formulations, and the numbers of components that they are called with.
+fn formulations(
+    source: &Source,
+    file: &File,
+    variables: &[InternalVariable],
+) -> Result<(Vec<FormulationDescription>, Vec<usize>), Error> {
+    let hypotheses = file.hypotheses.get_ref();
+    if hypotheses.is_empty() {
+        let names = Hypothesis::ALL.map(Hypothesis::name).join(", ");
+        return Err(source
+            .error(file.hypotheses.span(), "`hypotheses` is empty")
+            .hint(format!("name those that the routine is made for: {names}"))
+            .into());
+    }
+    let mut formulations = Vec::new();
+    let mut ntens = Vec::new();
+    for name in hypotheses {
+        let hypothesis = hypothesis(source, name)?;
+        ntens.push(called_with(source, file, name, hypothesis)?);
+        formulations.push(FormulationDescription {
+            hypothesis: hypothesis.name(),
+            index: formulations.len() as u32,
+            symmetric: file.symmetric,
+            tangent: match file.tangent {
+                Given::Consistent => Tangent::Consistent,
+                Given::Approximate => Tangent::Approximate,
+            },
+            time_dependent: file.time_dependent,
+            internal_variables: variables.to_vec(),
+            ..FormulationDescription::default()
+        });
+    }
+    unique(source, hypotheses.iter(), "hypothesis")?;
+    Ok((formulations, ntens))
 }
 
 /// `libNAME.so` has `NAME.law.toml` or `libNAME.law.toml` next to it.

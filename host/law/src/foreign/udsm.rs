@@ -120,63 +120,8 @@ fn describe(routine: Routine, model: i32) -> Result<LawDescription, String> {
     let name = routine.model_name(model);
     let name = name.map_or(String::new(), |name| readable(&name));
     let id = identifier(&name, &format!("model_{model}"));
-    let n_parameters = routine.count("GetParamCount", model);
-    let n_parameters = n_parameters.unwrap_or(N_PROPS as i32);
-    if !(0..=N_PROPS as i32).contains(&n_parameters) {
-        return Err(format!(
-            "model `{id}` says that it has {n_parameters} parameters, Props holds {N_PROPS}"
-        ));
-    }
-    let text = |function: &str, number: i32| {
-        let text = routine.name(function, model, number);
-        text.map_or(String::new(), |text| readable(&text))
-    };
-    let mut parameters: Vec<ParameterDescription> = Vec::new();
-    for number in 1..=n_parameters {
-        let symbol = text("GetParamName", number);
-        let id = identifier(&symbol, &format!("prop_{number}"));
-        let is_taken = parameters.iter().any(|other| other.id == id);
-        parameters.push(ParameterDescription {
-            id: numbered(id, is_taken, number),
-            doc: format!("Parameter {number}, {symbol}"),
-            symbol,
-            unit: unit(&text("GetParamUnit", number)),
-            ..ParameterDescription::default()
-        });
-    }
-    let block = asked(routine, model, Task::CountStates)?;
-    let n_states = block.integer(A::NStat);
-    if let Some(said) = routine.count("GetStateVarCount", model)
-        && said != n_states
-    {
-        return Err(format!(
-            "model `{id}`: GetStateVarCount says {said} state variables, task 4 says {n_states}"
-        ));
-    }
-    if !(0..=MOST_STATES).contains(&n_states) {
-        return Err(format!(
-            "model `{id}` says by task 4 that it has {n_states} state variables; 0 to {MOST_STATES} are \
-             allowed"
-        ));
-    }
-    let mut internal_variables: Vec<InternalVariable> = Vec::new();
-    for number in 1..=n_states {
-        let symbol = text("GetStateVarName", number);
-        let id = identifier(&symbol, &format!("state_{number}"));
-        let id = if is_column(&id) {
-            format!("state_{id}")
-        } else {
-            id
-        };
-        let is_taken = internal_variables.iter().any(|other| other.id == id);
-        internal_variables.push(InternalVariable {
-            id: numbered(id, is_taken, number),
-            doc: format!("State variable {number}, {symbol}"),
-            symbol,
-            unit: unit(&text("GetStateVarUnit", number)),
-            ..InternalVariable::default()
-        });
-    }
+    let parameters = parameters(routine, model, &id)?;
+    let internal_variables = state_variables(routine, model, &id)?;
     let attributes = asked(routine, model, Task::Attributes)?;
     let solids = [
         Hypothesis::PlaneStrain,
@@ -206,6 +151,78 @@ fn describe(routine: Routine, model: i32) -> Result<LawDescription, String> {
         ..LawDescription::default()
     };
     Ok(law.completed())
+}
+
+/// A name or a unit of a parameter or a state variable.
+fn said(routine: Routine, function: &str, model: i32, number: i32) -> String {
+    let text = routine.name(function, model, number);
+    text.map_or(String::new(), |text| readable(&text))
+}
+
+fn parameters(
+    routine: Routine,
+    model: i32,
+    law: &str,
+) -> Result<Vec<ParameterDescription>, String> {
+    let n = routine.count("GetParamCount", model);
+    let n = n.unwrap_or(N_PROPS as i32);
+    if !(0..=N_PROPS as i32).contains(&n) {
+        return Err(format!(
+            "model `{law}` says that it has {n} parameters, Props holds {N_PROPS}"
+        ));
+    }
+    let mut parameters: Vec<ParameterDescription> = Vec::new();
+    for number in 1..=n {
+        let symbol = said(routine, "GetParamName", model, number);
+        let id = identifier(&symbol, &format!("prop_{number}"));
+        let is_taken = parameters.iter().any(|other| other.id == id);
+        parameters.push(ParameterDescription {
+            id: numbered(id, is_taken, number),
+            doc: format!("Parameter {number}, {symbol}"),
+            symbol,
+            unit: unit(&said(routine, "GetParamUnit", model, number)),
+            ..ParameterDescription::default()
+        });
+    }
+    Ok(parameters)
+}
+
+fn state_variables(
+    routine: Routine,
+    model: i32,
+    law: &str,
+) -> Result<Vec<InternalVariable>, String> {
+    let n = asked(routine, model, Task::CountStates)?.integer(A::NStat);
+    if let Some(said) = routine.count("GetStateVarCount", model)
+        && said != n
+    {
+        return Err(format!(
+            "model `{law}`: GetStateVarCount says {said} state variables, task 4 says {n}"
+        ));
+    }
+    if !(0..=MOST_STATES).contains(&n) {
+        return Err(format!(
+            "model `{law}` says by task 4 that it has {n} state variables; 0 to {MOST_STATES} are \
+             allowed"
+        ));
+    }
+    let mut variables: Vec<InternalVariable> = Vec::new();
+    for number in 1..=n {
+        let symbol = said(routine, "GetStateVarName", model, number);
+        let mut id = identifier(&symbol, &format!("state_{number}"));
+        if is_column(&id) {
+            id = format!("state_{id}");
+        }
+        let is_taken = variables.iter().any(|other| other.id == id);
+        variables.push(InternalVariable {
+            id: numbered(id, is_taken, number),
+            doc: format!("State variable {number}, {symbol}"),
+            symbol,
+            unit: unit(&said(routine, "GetStateVarUnit", model, number)),
+            ..InternalVariable::default()
+        });
+    }
+    Ok(variables)
 }
 
 /// The answer to a task that is not about a point.

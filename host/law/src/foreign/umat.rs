@@ -307,8 +307,8 @@ impl Material {
         Ok(())
     }
 
-    /// One call, from fresh arguments.
-    fn ask(&self, block: &mut Block, start: &Start<'_>, increment: &[f64]) -> Result<(), Refusal> {
+    /// Fresh arguments.
+    fn fill(&self, block: &mut Block, start: &Start<'_>, increment: &[f64]) {
         block.refresh(self.blocks.template());
         let site = start.site(0);
         block.set(A::Stress, start.flux.0);
@@ -325,6 +325,11 @@ impl Material {
         block.set_integers(A::Jstep, &[start.moment.step as i32, 1, 0, 0]);
         block.set_integers(A::Kinc, &[start.moment.increment as i32]);
         block.hand_over();
+    }
+
+    /// One call, from fresh arguments.
+    fn ask(&self, block: &mut Block, start: &Start<'_>, increment: &[f64]) -> Result<(), Refusal> {
+        self.fill(block, start, increment);
         let recorded = self.record.as_ref().filter(|file| {
             increment.iter().any(|v| *v != 0.0)
                 && !self.is_recorded.swap(true, Ordering::Relaxed)

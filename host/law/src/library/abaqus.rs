@@ -80,44 +80,37 @@ unsafe extern "C" fn stdb_abqerr_(
     let mut message = pieces.next().unwrap_or_default().to_owned();
     let (mut n_integers, mut n_reals, mut n_strings) = (0, 0, 0);
     for piece in pieces {
-        let rest = match piece.chars().next() {
+        let mut rest = piece.chars();
+        match rest.next() {
             Some('I' | 'i') => {
                 // SAFETY: the text asks for this entry.
                 let _ = write!(message, "{}", unsafe { *integers.add(n_integers) });
                 n_integers += 1;
-                &piece[1..]
             }
             Some('R' | 'r') => {
                 // SAFETY: as above.
                 let _ = write!(message, "{:e}", unsafe { *reals.add(n_reals) });
                 n_reals += 1;
-                &piece[1..]
             }
             Some('S' | 's') => {
                 // SAFETY: as above; entries have 8 characters.
                 let entry = unsafe { characters(texts.add(n_strings * N_CHARV), N_CHARV) };
                 message += entry.trim_end();
                 n_strings += 1;
-                &piece[1..]
             }
-            _ => piece,
-        };
-        message += rest;
+            _ => rest = piece.chars(),
+        }
+        message += rest.as_str();
     }
     // SAFETY: a scalar argument.
     let lop = unsafe { *lop };
-    let kind = if lop == 1 {
-        "note"
-    } else if lop == -1 {
-        "warning"
-    } else {
-        "error"
+    let kind = match lop {
+        1 => "note",
+        -1 => "warning",
+        _ => "error",
     };
-    let _ = writeln!(
-        std::io::stderr(),
-        "{kind} of the routine: {}",
-        message.trim_end()
-    );
+    let message = message.trim_end();
+    let _ = writeln!(std::io::stderr(), "{kind} of the routine: {message}");
     if lop == -3 {
         xit_();
     }

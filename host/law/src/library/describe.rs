@@ -268,12 +268,12 @@ fn describe_parameter(
     })
 }
 
-fn describe_formulation(
+/// Refuses other gradients and fluxes than the pair of the hypothesis.
+fn one_pair(
     formulation: &Formulation,
     hypothesis: Hypothesis,
-    index: u32,
     allowance: &Allowance,
-) -> Result<FormulationDescription, String> {
+) -> Result<(), String> {
     let name = hypothesis.name();
     let (gradient_id, flux_id) = words(hypothesis);
     let pair = [
@@ -296,21 +296,38 @@ fn describe_formulation(
             ));
         }
     }
-    // A tangent is one thing: all of the response, near the derivative of the update, or none.
-    let flags = [
-        (raw::PILUM_T_LINEAR, "PILUM_T_LINEAR"),
+    Ok(())
+}
+
+/// A tangent is one thing: all of the response, near the derivative of the update, or none.
+fn tangent(flags: u32, name: &str) -> Result<Tangent, String> {
+    let kinds = [
+        (raw::PILUM_T_LINEAR, "PILUM_T_LINEAR", Tangent::Consistent),
         (
             raw::PILUM_T_TANGENT_APPROXIMATE,
             "PILUM_T_TANGENT_APPROXIMATE",
+            Tangent::Approximate,
         ),
-        (raw::PILUM_T_NO_TANGENT, "PILUM_T_NO_TANGENT"),
+        (raw::PILUM_T_NO_TANGENT, "PILUM_T_NO_TANGENT", Tangent::None),
     ];
-    let mut set = flags
-        .iter()
-        .filter(|(flag, _)| formulation.flags & flag != 0);
-    if let (Some((_, one)), Some((_, other))) = (set.next(), set.next()) {
-        return Err(format!("{name}: {one} and {other} contradict each other"));
+    let mut set = kinds.into_iter().filter(|(flag, ..)| flags & flag != 0);
+    match (set.next(), set.next()) {
+        (Some((_, one, _)), Some((_, other, _))) => {
+            Err(format!("{name}: {one} and {other} contradict each other"))
+        }
+        (one, _) => Ok(one.map_or(Tangent::Consistent, |(.., tangent)| tangent)),
     }
+}
+
+fn describe_formulation(
+    formulation: &Formulation,
+    hypothesis: Hypothesis,
+    index: u32,
+    allowance: &Allowance,
+) -> Result<FormulationDescription, String> {
+    let name = hypothesis.name();
+    one_pair(formulation, hypothesis, allowance)?;
+    let tangent = tangent(formulation.flags, name)?;
     let mut internal_variables = Vec::new();
     for variable in table(
         formulation.state,
@@ -328,13 +345,7 @@ fn describe_formulation(
         hypothesis: name,
         index,
         symmetric: formulation.flags & raw::PILUM_T_SYMMETRIC != 0,
-        tangent: if formulation.flags & raw::PILUM_T_NO_TANGENT != 0 {
-            Tangent::None
-        } else if formulation.flags & raw::PILUM_T_TANGENT_APPROXIMATE != 0 {
-            Tangent::Approximate
-        } else {
-            Tangent::Consistent
-        },
+        tangent,
         rates: formulation.flags & raw::PILUM_T_RATES != 0,
         linear: formulation.flags & raw::PILUM_T_LINEAR != 0 && internal_variables.is_empty(),
         time_dependent: false,

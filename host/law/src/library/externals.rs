@@ -203,16 +203,12 @@ fn trap_library(names: &[String], target: u64) -> Option<Vec<u8>> {
     } else {
         return None;
     };
-    let mut strings = vec![0];
-    let starts: Vec<usize> = names
-        .iter()
-        .map(|name| {
-            let start = strings.len();
-            strings.extend(name.as_bytes());
-            strings.push(0);
-            start
-        })
-        .collect();
+    let (mut strings, mut starts) = (vec![0], Vec::new());
+    for name in names {
+        starts.push(strings.len());
+        strings.extend(name.as_bytes());
+        strings.push(0);
+    }
     let n_symbols = names.len() + 1;
     let symbols_at = HEADERS;
     let hash_at = symbols_at + 24 * n_symbols;
@@ -231,6 +227,23 @@ fn trap_library(names: &[String], target: u64) -> Option<Vec<u8>> {
     let dynamic_size = size_of_val(&dynamic);
 
     let mut out = Words::default();
+    headers(&mut out, machine, end, (dynamic_at, dynamic_size));
+    out.up_to(symbols_at + 24);
+    symbols(&mut out, &starts, traps_at);
+    out.0.extend(strings);
+    for number in 0..names.len() {
+        out.up_to(traps_at + TRAP * number);
+        trap_code(&mut out, number as u32, target);
+    }
+    out.up_to(dynamic_at);
+    for [tag, value] in dynamic {
+        out.u64(tag).u64(value);
+    }
+    Some(out.0)
+}
+
+/// The headers of an ELF library of this length that is executed, and of the dynamic part behind it.
+fn headers(out: &mut Words, machine: u16, end: usize, (dynamic_at, dynamic_size): (usize, usize)) {
     out.0.extend(elf::ELFMAG);
     out.0
         .extend([elf::ELFCLASS64, elf::ELFDATA2LSB, elf::EV_CURRENT, 0]);
@@ -249,30 +262,23 @@ fn trap_library(names: &[String], target: u64) -> Option<Vec<u8>> {
         out.u32(kind).u32(flags).u64(at).u64(at).u64(at);
         out.u64(size).u64(size).u64(align as u64);
     }
-    out.up_to(symbols_at + 24);
-    for (number, start) in starts.iter().enumerate() {
-        out.u32(*start as u32);
+}
+
+/// Symbols of the traps behind the first one, which is none, and their hash table.
+fn symbols(out: &mut Words, names_at: &[usize], traps_at: usize) {
+    for (number, name_at) in names_at.iter().enumerate() {
+        out.u32(*name_at as u32);
         out.0.extend([elf::STB_GLOBAL << 4 | elf::STT_FUNC, 0]);
         // Any section there is: the symbol is defined.
         out.u16(1);
         out.u64((traps_at + TRAP * number) as u64).u64(TRAP as u64);
     }
     // One bucket, with all symbols in a chain.
-    out.u32(1).u32(n_symbols as u32).u32(1).u32(0);
-    for number in 1..n_symbols {
-        let next = (number + 1) % n_symbols;
-        out.u32(next as u32);
+    let n = names_at.len() + 1;
+    out.u32(1).u32(n as u32).u32(1).u32(0);
+    for number in 1..n {
+        out.u32(((number + 1) % n) as u32);
     }
-    out.0.extend(strings);
-    for number in 0..names.len() {
-        out.up_to(traps_at + TRAP * number);
-        trap_code(&mut out, number as u32, target);
-    }
-    out.up_to(dynamic_at);
-    for [tag, value] in dynamic {
-        out.u64(tag).u64(value);
-    }
-    Some(out.0)
 }
 
 /// target(number), without coming back.

@@ -164,15 +164,13 @@ impl Instance for OwnedInstance {
             gradient0: of_update(start.gradient),
             gradient1: of_update(start.gradient_end),
             flux0: view(start.flux, n, c),
-            state0: if start.state.is_empty() {
-                NOTHING
-            } else {
-                view((start.state, states), n, n_states)
+            state0: match start.state {
+                [] => NOTHING,
+                all => view((all, states), n, n_states),
             },
-            flux1: if operator.is_some() {
-                view_mut((&mut *end.flux.0, end.flux.1), n, c)
-            } else {
-                NOWHERE
+            flux1: match operator {
+                Some(_) => view_mut((&mut *end.flux.0, end.flux.1), n, c),
+                None => NOWHERE,
             },
             state1: view_mut((&mut *end.state, states), n, n_states),
             tangent: if n_entries > 0 {

@@ -125,40 +125,33 @@ impl Behaviour {
                 && point.k.len() >= (sizes.n * sizes.n).max(1)
         );
         let mut message = [0 as c_char; MESSAGE];
-        // Density, and stored and dissipated energy, at both ends; and the speed of sound.
-        let mut scalars = [0.0; 7];
-        let [density0, density1, stored0, stored1, lost0, lost1, sound] = scalars.each_mut();
-        let [gradient0, gradient1] = &mut point.gradients;
-        let [force0, force1] = &mut point.forces;
-        let [state0, state1] = &mut point.states;
+        // Density, and stored and dissipated energy, at both ends.
+        let mut scalars = [[0.0; 3]; 2];
+        let mut sound = 0.0;
         let properties = point.properties.as_mut_ptr();
         let external = point.external.as_mut_ptr();
+        let [s0, s1] = [0, 1].map(|end| {
+            let [mass_density, stored_energy, dissipated_energy] =
+                scalars[end].each_mut().map(std::ptr::from_mut);
+            State {
+                gradients: point.gradients[end].as_mut_ptr(),
+                thermodynamic_forces: point.forces[end].as_mut_ptr(),
+                mass_density,
+                material_properties: properties,
+                internal_state_variables: or_null(&mut point.states[end]),
+                stored_energy,
+                dissipated_energy,
+                external_state_variables: external,
+            }
+        });
         let mut data = Data {
             error_message: message.as_mut_ptr(),
             dt: point.dt,
             k: point.k.as_mut_ptr(),
             rdt: &raw mut point.rdt,
-            speed_of_sound: sound,
-            s0: State {
-                gradients: gradient0.as_mut_ptr(),
-                thermodynamic_forces: force0.as_mut_ptr(),
-                mass_density: density0,
-                material_properties: properties,
-                internal_state_variables: or_null(state0),
-                stored_energy: stored0,
-                dissipated_energy: lost0,
-                external_state_variables: external,
-            },
-            s1: State {
-                gradients: gradient1.as_mut_ptr(),
-                thermodynamic_forces: force1.as_mut_ptr(),
-                mass_density: density1,
-                material_properties: properties,
-                internal_state_variables: or_null(state1),
-                stored_energy: stored1,
-                dissipated_energy: lost1,
-                external_state_variables: external,
-            },
+            speed_of_sound: &raw mut sound,
+            s0,
+            s1,
         };
         // SAFETY: the interface: every array has the size that the library's own symbols give,
         // see above, and lives until the call has returned.

@@ -17,14 +17,13 @@ use crate::instance::{Answer as Answered, Instance, Source};
 use abi::Hypothesis;
 use abi::raw::{self, Batch, Status};
 use abi::status::most_severe;
-use arrays::{Array, Directions, in_pages, inputs, message_buffer};
+use arrays::{Arrays, Directions, in_pages, locked, message_buffer};
 use call_log::{Function, KeptCall, KeptPhase, Phase};
 use entry::other_host;
 pub use entry::{enter, open, shake_hands};
 use form::terminated;
 pub use form::{Answer, Form, Order, PointEnd};
 pub use pages::Fence;
-use pages::Pages;
 use std::ffi::c_char;
 use std::io;
 use std::mem::size_of;
@@ -141,15 +140,7 @@ pub(crate) fn create(id: &str, law: LawHandle, form: &CreateForm<'_>) -> io::Res
         (0, raw::PILUM_ABI_MINOR) => &raw const HOST.0,
         (more, minor) => other_host(more, minor)?,
     };
-    let values = form
-        .values
-        .map(|values| -> io::Result<Array> {
-            let mut array = Array::new(Order::Points, true, 1, values.len(), Fence::After)?;
-            array.put(0, values);
-            array.pages.lock()?;
-            Ok(array)
-        })
-        .transpose()?;
+    let values = form.values.map(locked).transpose()?;
     let message = message_buffer(form.message)?;
     let mut instance: *mut raw::Instance = null_mut();
     let all = form.values.unwrap_or_default();
@@ -381,7 +372,6 @@ impl Probe {
         }
     }
 
-    #[expect(clippy::too_many_lines, reason = "a batch has many arrays")]
     fn call(
         &self,
         function: Function,
@@ -405,100 +395,23 @@ impl Probe {
         }) else {
             return Err(io::Error::other("the function is null"));
         };
-        let n = starts.len();
-        let integrating = function == Function::Integrate;
-        let n_gradient = if integrating { self.n_components } else { 0 };
-        let n_tangent = if form.request & (raw::PILUM_REQ_TANGENT | raw::PILUM_REQ_ELASTIC) == 0 {
-            0
-        } else {
-            n_gradient * n_gradient
-        };
-        let n_state0 = if integrating { self.n_states } else { 0 };
-        let input = |n_components, values| {
-            let place = (form.order, form.around_inputs);
-            let mut array = inputs(place, n_components, starts, values)?;
-            if form.inputs_locked {
-                array.pages.lock()?;
-            }
-            io::Result::Ok(array)
-        };
-        let output =
-            |n_components| Array::new(form.order, false, n, n_components, form.around_outputs);
-        let gradient0 = input(n_gradient, |start| &start.gradient0)?;
-        let gradient1 = input(n_gradient, |start| &start.gradient1)?;
-        let flux0 = input(self.n_components, |start| &start.flux0)?;
-        let state0 = input(n_state0, |start| &start.state0)?;
-        let flux1 = output(n_gradient)?;
-        let state1 = output(self.n_states)?;
-        let tangent = output(n_tangent)?;
+        let arrays = Arrays::new(self, function, starts, form)?;
         let directions = rates
             .map(|(rates, parameter)| Directions::new(self, rates, parameter))
             .transpose()?;
         let given = directions.as_ref().map(Directions::raw);
-        let step_factor = Array::new(Order::Points, false, n, 1, form.around_outputs)?;
-        let mut status = Pages::new(n * size_of::<Status>(), form.around_outputs)?;
-        for four in status.bytes_mut().chunks_exact_mut(size_of::<Status>()) {
-            four.copy_from_slice(&NO_OUTCOME.to_ne_bytes());
-        }
-        let message = message_buffer(form.message)?;
         let batch = Batch {
-            struct_size: form.batch_bytes as u32,
             request: self.asked(form),
-            n_points: n as u64,
-            first_point: form.first_point,
-            time: form.time,
-            time_increment: form.time_increment,
-            gradient0: gradient0.view(),
-            gradient1: gradient1.view(),
-            flux0: flux0.view(),
-            state0: state0.view(),
-            flux1: flux1.view_mut(),
-            state1: state1.view_mut(),
-            tangent: tangent.view_mut(),
-            status: if form.outcomes {
-                status.pointer().cast()
-            } else {
-                null_mut()
-            },
-            step_factor: if form.outcomes {
-                step_factor.pages.pointer().cast()
-            } else {
-                null_mut()
-            },
-            message: message.as_ref().map_or(null_mut(), |m| m.pointer().cast()),
-            message_capacity: form.message.unwrap_or(0),
-            step_time: form.time,
             rates: given.as_ref().map_or(null(), std::ptr::from_ref),
+            ..arrays.batch(form)
         };
         let letter = in_pages(&batch, form.batch_bytes)?;
         keep(self.whose(), function, *form, starts)?;
         // SAFETY: contract, "Batch": every view lies in pages that live until the end of this
         // function; a batch that tells less than version 1.0 has to be refused unread.
         let returned = unsafe { called(own.instance, letter.pointer().cast()) };
-        let statuses = status
-            .bytes()
-            .chunks_exact(size_of::<Status>())
-            .map(|four| Status::from_ne_bytes([four[0], four[1], four[2], four[3]]));
-        let points = statuses
-            .enumerate()
-            .map(|(i, status)| PointEnd {
-                status,
-                step_factor: step_factor.row(i)[0],
-                flux: flux1.row(i),
-                state: state1.row(i),
-                tangent: tangent.row(i),
-            })
-            .collect();
-        let answer = Answer {
-            status: returned,
-            message: message.map_or(Vec::new(), |pages| pages.bytes().to_vec()),
-            points,
-            stray: [flux1, state1, tangent].iter().any(Array::stray),
-        };
-        Ok((
-            answer,
-            directions.map_or(Vec::new(), |written| written.rows()),
-        ))
+        let rates = directions.map_or(Vec::new(), |written| written.rows());
+        Ok((arrays.answer(returned), rates))
     }
 }
 

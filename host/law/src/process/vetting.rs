@@ -24,6 +24,18 @@ pub(crate) const PASSED: &str = "passed";
 /// Its last words where the library was refused in an orderly way.
 pub(crate) const REFUSED: &str = "refused";
 
+/// There is no child process.
+fn untried(path: &Path, why: &std::io::Error) -> Error {
+    let library = path.display();
+    if why.kind() == ErrorKind::OutOfMemory {
+        let message = format!("not enough memory to try library {library} in a child process");
+        return text::Error::Usage(message).into();
+    }
+    Error::library(format!(
+        "library {library} cannot be tried in a child process: {why}"
+    ))
+}
+
 /// Tries a library in a child process, unless that was done. Orderly refusals are left to this
 /// process, which finds the same.
 ///
@@ -45,16 +57,7 @@ pub(crate) fn vet(path: &Path, sha256: &str) -> Result<(), Error> {
         time: TIME,
         memory: Some(MEMORY),
     };
-    let outcome = child::run(&work).map_err(|why| {
-        let library = path.display();
-        if why.kind() == ErrorKind::OutOfMemory {
-            let message = format!("not enough memory to try library {library} in a child process");
-            return text::Error::Usage(message).into();
-        }
-        Error::library(format!(
-            "library {library} cannot be tried in a child process: {why}"
-        ))
-    })?;
+    let outcome = child::run(&work).map_err(|why| untried(path, &why))?;
     let output = String::from_utf8_lossy(&outcome.stdout);
     let mut marked = output.lines().filter_map(|line| line.split_once(MARK));
     let last = marked.next_back().map_or("loading it", |(_, said)| said);

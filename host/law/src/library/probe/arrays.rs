@@ -2,9 +2,13 @@
 
 use super::super::{NOTHING, NOWHERE};
 use super::pages::Pages;
-use super::{EndRates, Fence, Order, PointRates, PointStart, Probe, UNWRITTEN};
-use abi::raw::{Batch, Rates, View, ViewMut};
+use super::{
+    Answer, EndRates, Fence, Form, Function, NO_OUTCOME, Order, PointEnd, PointRates, PointStart,
+    Probe, UNWRITTEN,
+};
+use abi::raw::{self, Batch, Rates, Status, View, ViewMut};
 use std::io;
+use std::ptr::{null, null_mut};
 
 /// Values of many points in their own pages.
 #[derive(Debug)]
@@ -140,6 +144,127 @@ pub(super) fn message_buffer(capacity: Option<usize>) -> io::Result<Option<Pages
         *first = 0;
     }
     Ok(Some(pages))
+}
+
+/// Values of one point that can only be read.
+pub(super) fn locked(values: &[f64]) -> io::Result<Array> {
+    let mut array = Array::new(Order::Points, true, 1, values.len(), Fence::After)?;
+    array.put(0, values);
+    array.pages.lock()?;
+    Ok(array)
+}
+
+/// The arrays of one call.
+pub(super) struct Arrays {
+    n_points: usize,
+    gradient0: Array,
+    gradient1: Array,
+    flux0: Array,
+    state0: Array,
+    flux1: Array,
+    state1: Array,
+    tangent: Array,
+    step_factor: Array,
+    status: Pages,
+    message: Option<Pages>,
+}
+
+impl Arrays {
+    pub(super) fn new(
+        probe: &Probe,
+        function: Function,
+        starts: &[PointStart],
+        form: &Form,
+    ) -> io::Result<Self> {
+        let n = starts.len();
+        let (n_gradient, n_state0) = match function {
+            Function::Integrate => (probe.n_components, probe.n_states),
+            _ => (0, 0),
+        };
+        let has_operator = form.request & (raw::PILUM_REQ_TANGENT | raw::PILUM_REQ_ELASTIC) != 0;
+        let n_tangent = usize::from(has_operator) * n_gradient * n_gradient;
+        let input = |n_components, values| {
+            let place = (form.order, form.around_inputs);
+            let mut array = inputs(place, n_components, starts, values)?;
+            if form.inputs_locked {
+                array.pages.lock()?;
+            }
+            io::Result::Ok(array)
+        };
+        let output =
+            |n_components| Array::new(form.order, false, n, n_components, form.around_outputs);
+        let mut status = Pages::new(n * size_of::<Status>(), form.around_outputs)?;
+        for four in status.bytes_mut().chunks_exact_mut(size_of::<Status>()) {
+            four.copy_from_slice(&NO_OUTCOME.to_ne_bytes());
+        }
+        Ok(Self {
+            n_points: n,
+            gradient0: input(n_gradient, |start| &start.gradient0)?,
+            gradient1: input(n_gradient, |start| &start.gradient1)?,
+            flux0: input(probe.n_components, |start| &start.flux0)?,
+            state0: input(n_state0, |start| &start.state0)?,
+            flux1: output(n_gradient)?,
+            state1: output(probe.n_states)?,
+            tangent: output(n_tangent)?,
+            step_factor: Array::new(Order::Points, false, n, 1, form.around_outputs)?,
+            status,
+            message: message_buffer(form.message)?,
+        })
+    }
+
+    /// The batch, without rates.
+    pub(super) fn batch(&self, form: &Form) -> Batch {
+        let (mut status, mut step_factor) = (null_mut(), null_mut());
+        if form.outcomes {
+            status = self.status.pointer().cast();
+            step_factor = self.step_factor.pages.pointer().cast();
+        }
+        let message = self.message.as_ref();
+        Batch {
+            struct_size: form.batch_bytes as u32,
+            request: form.request,
+            n_points: self.n_points as u64,
+            first_point: form.first_point,
+            time: form.time,
+            time_increment: form.time_increment,
+            gradient0: self.gradient0.view(),
+            gradient1: self.gradient1.view(),
+            flux0: self.flux0.view(),
+            state0: self.state0.view(),
+            flux1: self.flux1.view_mut(),
+            state1: self.state1.view_mut(),
+            tangent: self.tangent.view_mut(),
+            status,
+            step_factor,
+            message: message.map_or(null_mut(), |m| m.pointer().cast()),
+            message_capacity: form.message.unwrap_or(0),
+            step_time: form.time,
+            rates: null(),
+        }
+    }
+
+    /// What the law has written.
+    pub(super) fn answer(self, returned: Status) -> Answer {
+        let statuses = self.status.bytes().as_chunks().0.iter();
+        let points = statuses
+            .enumerate()
+            .map(|(i, status)| PointEnd {
+                status: Status::from_ne_bytes(*status),
+                step_factor: self.step_factor.row(i)[0],
+                flux: self.flux1.row(i),
+                state: self.state1.row(i),
+                tangent: self.tangent.row(i),
+            })
+            .collect();
+        let message = self.message.as_ref();
+        let outputs = [&self.flux1, &self.state1, &self.tangent];
+        Answer {
+            status: returned,
+            message: message.map_or(Vec::new(), |pages| pages.bytes().to_vec()),
+            points,
+            stray: outputs.into_iter().any(Array::stray),
+        }
+    }
 }
 
 /// The arrays of rates of one call.

@@ -137,15 +137,11 @@ impl Bench {
     }
 
     fn call(&mut self, header: &Header) -> io::Result<Answer> {
+        let sizes = header.sizes(self.n_components, self.n_states);
         if self.memory.len() != header.memory {
             self.memory.follow()?;
         }
-        let sizes = header.sizes(self.n_components, self.n_states);
-        let inputs = self.memory.read(0, sizes.inputs).map(f64::from_bits);
-        self.inputs.clear();
-        self.inputs.extend(inputs);
-        let sites: Vec<u64> = self.memory.read(sizes.inputs, sizes.sites).collect();
-        let sites: Vec<Site> = sites.as_chunks().0.iter().map(site_of).collect();
+        let sites = self.take_over(sizes.inputs, sizes.sites);
         self.outputs.clear();
         let n_outputs = sizes.flux + sizes.state + sizes.operator;
         self.outputs.resize(n_outputs, f64::NAN);
@@ -186,13 +182,28 @@ impl Bench {
             outcomes.status.fill(raw::PILUM_E_INTERNAL);
             return Ok((raw::PILUM_E_INTERNAL, COPIED.to_owned()));
         }
-        let values = self.outputs.iter().chain(&outcomes.factor);
+        self.hand_over(sizes.outputs());
+        Ok(answer)
+    }
+
+    /// Reads the inputs from the shared memory, and then the sites.
+    fn take_over(&mut self, n_inputs: usize, n_sites: usize) -> Vec<Site> {
+        let inputs = self.memory.read(0, n_inputs).map(f64::from_bits);
+        self.inputs.clear();
+        self.inputs.extend(inputs);
+        let sites: Vec<u64> = self.memory.read(n_inputs, n_sites).collect();
+        sites.as_chunks().0.iter().map(site_of).collect()
+    }
+
+    /// Writes results and outcomes to the shared memory.
+    fn hand_over(&mut self, at: usize) {
+        let Outcomes { status, factor } = &self.outcomes;
+        let values = self.outputs.iter().chain(factor);
         let values = values.map(|value| value.to_bits());
-        let at = self.memory.write(sizes.outputs(), values);
-        let status = outcomes.status.iter();
+        let at = self.memory.write(at, values);
+        let status = status.iter();
         let status = status.map(|status| u64::from(*status as u32));
         self.memory.write(at, status);
-        Ok(answer)
     }
 }
 
