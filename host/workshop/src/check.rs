@@ -116,6 +116,15 @@ static DRIVER: Check = Check {
 /// Checks of what is asked for, none of the library.
 static INNER: [&Check; 2] = [&SETTINGS, &DRIVER];
 
+/// What cannot be read needs no checks, and what it was is what is reported.
+fn sha256_of(path: &Path) -> Result<String, Error> {
+    let bytes = file::read_library(path).map_err(|source| text::Error::Unreadable {
+        path: path.to_owned(),
+        source,
+    })?;
+    Ok(hexadecimal_sha256(&bytes))
+}
+
 /// Checks a library and prints what it found.
 ///
 /// # Errors
@@ -136,13 +145,7 @@ pub fn run(
     }
     refuse_unknown(arguments)?;
     let path = arguments.library_path()?;
-    // What cannot be read needs no checks, and what it was is what is reported.
-    let bytes = file::read_library(&path).map_err(|source| text::Error::Unreadable {
-        path: path.clone(),
-        source,
-    })?;
-    let sha256 = hexadecimal_sha256(&bytes);
-    drop(bytes);
+    let sha256 = sha256_of(&path)?;
     let is_routine = routine::is_one(&path);
     refuse_checks_of_others(arguments, is_routine)?;
     let arguments = &arguments.with_absolute_driver()?;

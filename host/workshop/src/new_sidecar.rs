@@ -129,32 +129,14 @@ impl NewSidecar {
              # symmetric = true            # DDSDDE always is\n\
              # thread_safe = true          # several points at a time: no SAVE, no COMMON, no files\n",
         );
-        for i in 1..=self.nprops {
-            let _ = write!(
-                text,
-                "\n[[parameter]]                  # PROPS({i})\n\
-                 id = \"prop_{i}\"\n\
-                 unit = \"-\"\n\
-                 doc = \"Parameter {i}\"\n"
-            );
-            if i == 1 {
-                text.push_str("# lower = 0.0                # and upper, open_lower, open_upper, usual = [a, b]\n# default = 0.0\n");
-            }
-        }
-        for i in 1..=self.nstatv {
-            let _ = write!(
-                text,
-                "\n[[internal]]                   # STATEV({i})\n\
-                 id = \"statev_{i}\"\n\
-                 unit = \"-\"\n\
-                 doc = \"Internal variable {i}\"\n"
-            );
-            if i == 1 {
-                text.push_str(
-                    "# initial = 0.0\n# components = 6             # several values under one name\n",
-                );
-            }
-        }
+        let names = ["[[parameter]]", "PROPS", "prop", "Parameter"];
+        let hints = "# lower = 0.0                # and upper, open_lower, open_upper, usual = [a, b]\n\
+                     # default = 0.0\n";
+        tables(&mut text, self.nprops, names, hints);
+        let names = ["[[internal]]", "STATEV", "statev", "Internal variable"];
+        let hints =
+            "# initial = 0.0\n# components = 6             # several values under one name\n";
+        tables(&mut text, self.nstatv, names, hints);
         text
     }
 
@@ -195,6 +177,21 @@ fn identifier(name: &str) -> String {
         id
     } else {
         format!("umat_{id}")
+    }
+}
+
+/// Tables of an array of the routine, with hints in the first one.
+fn tables(text: &mut String, n: u32, [table, array, id, word]: [&str; 4], hints: &str) {
+    for i in 1..=n {
+        let hints = if i == 1 { hints } else { "" };
+        let _ = write!(
+            text,
+            "\n{table:<31}# {array}({i})\n\
+             id = \"{id}_{i}\"\n\
+             unit = \"-\"\n\
+             doc = \"{word} {i}\"\n\
+             {hints}"
+        );
     }
 }
 

@@ -455,6 +455,54 @@ fn bisect(succeeds: impl Fn(f64) -> bool, report: &mut Report<'_>) -> Option<f64
     Some(good)
 }
 
+/// Central differences of the fluxes around the end of a part of an increment.
+struct Differences<'a> {
+    law: &'a Law,
+    call: &'a PointCall,
+    fraction: f64,
+    end: Vec<f64>,
+    /// Largest component of the increment.
+    reach: f64,
+}
+
+impl<'a> Differences<'a> {
+    fn new(law: &'a Law, call: &'a PointCall, fraction: f64) -> Self {
+        let ends = call.start.gradient0.iter().zip(&call.start.gradient1);
+        let end = ends
+            .clone()
+            .map(|(start, end)| start + fraction * (end - start));
+        let reach = ends.clone().fold(0.0_f64, |max, (start, end)| {
+            max.max((fraction * (end - start)).abs())
+        });
+        Self {
+            law,
+            call,
+            fraction,
+            end: end.collect(),
+            reach: if reach > 0.0 { reach } else { 1e-6 },
+        }
+    }
+
+    /// How far a column of a tangent is off those of this size at most, and in which row; `None` where the law fails.
+    fn off(&self, matrix: &[f64], column: usize, size: f64) -> Option<(f64, usize)> {
+        let n = self.end.len();
+        let h = size * self.reach;
+        let side = |sign: f64| {
+            let mut moved = self.end.clone();
+            moved[column] += sign * h;
+            let time_increment = self.fraction * self.call.time_increment;
+            let request = Request::Update(Operator::None);
+            update_to(self.law, self.call, request, &moved, time_increment)
+        };
+        let (plus, minus) = (side(1.0).ok()?.0, side(-1.0).ok()?.0);
+        let off = (0..n).map(|i| {
+            let slope = (plus[i] - minus[i]) / (2.0 * h);
+            ((slope - matrix[i * n + column]).abs(), i)
+        });
+        off.max_by(|a, b| a.0.total_cmp(&b.0))
+    }
+}
+
 /// Compares the tangent with central differences of the fluxes, in words.
 fn tangent(law: &Law, call: &PointCall, fraction: f64) -> String {
     let consistent = Request::Update(Operator::Consistent);
@@ -464,44 +512,19 @@ fn tangent(law: &Law, call: &PointCall, fraction: f64) -> String {
         Err(failure) => return format!("no tangent to compare: {}", failure.message),
     };
     let largest = matrix.iter().fold(0.0_f64, |max, v| max.max(v.abs()));
-    let ends = call.start.gradient0.iter().zip(&call.start.gradient1);
-    let end: Vec<f64> = ends
-        .clone()
-        .map(|(start, end)| start + fraction * (end - start))
-        .collect();
-    let reach = ends.fold(0.0_f64, |max, (start, end)| {
-        max.max((fraction * (end - start)).abs())
-    });
-    let reach = if reach > 0.0 { reach } else { 1e-6 };
-    let mut worst: Option<(f64, usize, usize)> = None;
-    for j in 0..n {
-        let column = DIFFERENCES
+    let differences = Differences::new(law, call, fraction);
+    // The best differences of each column.
+    let columns = (0..n).filter_map(|j| {
+        let sizes = DIFFERENCES
             .iter()
-            .filter_map(|size| {
-                let h = size * reach;
-                let side = |sign: f64| {
-                    let mut moved = end.clone();
-                    moved[j] += sign * h;
-                    let time_increment = fraction * call.time_increment;
-                    let request = Request::Update(Operator::None);
-                    update_to(law, call, request, &moved, time_increment)
-                };
-                let (plus, minus) = (side(1.0).ok()?.0, side(-1.0).ok()?.0);
-                let difference = |i: usize| {
-                    let slope = (plus[i] - minus[i]) / (2.0 * h);
-                    (slope - matrix[i * n + j]).abs()
-                };
-                (0..n)
-                    .map(|i| (difference(i), i))
-                    .max_by(|a, b| a.0.total_cmp(&b.0))
-            })
-            .min_by(|a, b| a.0.total_cmp(&b.0));
-        if let Some((difference, i)) = column
-            && worst.is_none_or(|(worst, ..)| difference > worst)
-        {
-            worst = Some((difference, i, j));
-        }
-    }
+            .filter_map(|size| differences.off(&matrix, j, *size));
+        let (off, i) = sizes.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some((off, i, j))
+    });
+    let first_of_the_worst = |worst: (f64, usize, usize), other: (f64, usize, usize)| {
+        if other.0 > worst.0 { other } else { worst }
+    };
+    let worst = columns.reduce(first_of_the_worst);
     let names = law.hypothesis().components();
     match worst {
         None => "the tangent cannot be compared: the law fails on both sides".to_owned(),

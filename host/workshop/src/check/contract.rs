@@ -142,6 +142,23 @@ fn must_refuse(
     text.ok_or_else(|| fault("there is no message"))
 }
 
+/// Whether `create` refuses such arguments, with a message and without room for one.
+fn is_refused(law: &LoadedLaw, what: &str, form: &CreateForm<'_>) -> Result<(), Verdict> {
+    must_refuse(law, what, &law.probe(form)?, raw::PILUM_E_ARGUMENT)?;
+    let mute = law.probe(&CreateForm {
+        message: None,
+        ..*form
+    })?;
+    if mute.status == raw::PILUM_E_ARGUMENT {
+        return Ok(());
+    }
+    Err(failed(format!(
+        "`{}`: {what}, without a message: `create` returned {}",
+        law.description().id,
+        status_name(mute.status)
+    )))
+}
+
 fn wrong_arguments_are_refused(subject: &Subject) -> Found {
     let mut random = Random::new(subject.seed, "arguments");
     for law in subject.laws()? {
@@ -184,18 +201,7 @@ fn wrong_arguments_are_refused(subject: &Subject) -> Found {
             ];
             for (what, form) in wrong {
                 let Some(form) = form else { continue };
-                must_refuse(&law, what, &law.probe(&form)?, raw::PILUM_E_ARGUMENT)?;
-                let mute = law.probe(&CreateForm {
-                    message: None,
-                    ..form
-                })?;
-                if mute.status != raw::PILUM_E_ARGUMENT {
-                    return Err(failed(format!(
-                        "`{}`: {what}, without a message: `create` returned {}",
-                        law.description().id,
-                        status_name(mute.status)
-                    )));
-                }
+                is_refused(&law, what, &form)?;
             }
         }
     }

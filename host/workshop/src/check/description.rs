@@ -143,67 +143,73 @@ fn is_unit(text: &str) -> bool {
         .all(|factor| KNOWN.contains(&factor.split('^').next().unwrap_or_default()))
 }
 
+/// Other names of units.
+const NAMES: [(&str, &str); 13] = [
+    ("°", "deg"),
+    ("degree", "deg"),
+    ("degrees", "deg"),
+    ("radian", "rad"),
+    ("radians", "rad"),
+    ("%", "-"),
+    ("sec", "s"),
+    ("hr", "h"),
+    ("day", "d"),
+    ("days", "d"),
+    ("meter", "m"),
+    ("metre", "m"),
+    ("none", "-"),
+];
+
+/// Units of another scale, and those that go with the rest.
+const OTHER_SCALE: [(&str, &str); 6] = [
+    ("Pa", "kPa"),
+    ("MPa", "kPa"),
+    ("GPa", "kPa"),
+    ("N", "kN"),
+    ("MN", "kN"),
+    ("cm", "m"),
+];
+
+/// A factor in the spelling of the contract.
+fn spelled(factor: &str) -> Option<String> {
+    let plain: String = factor
+        .chars()
+        .map(|c| match c {
+            '²' => '2',
+            '³' => '3',
+            other => other,
+        })
+        .collect();
+    let digits = plain.find(|c: char| c.is_ascii_digit() || c == '^' || c == '-');
+    let (name, power) = plain.split_at(digits.filter(|&at| at > 0).unwrap_or(plain.len()));
+    let power = power.trim_start_matches('^');
+    let listed = |table: &[(&str, &'static str)]| {
+        let mut rows = table.iter();
+        rows.find(|(known, _)| known.eq_ignore_ascii_case(name))
+            .map(|(_, right)| *right)
+    };
+    let exactly = |table: &[(&str, &'static str)]| {
+        let mut rows = table.iter();
+        rows.find(|(known, _)| *known == name)
+            .map(|(_, right)| *right)
+    };
+    let known = KNOWN.iter().find(|known| **known == name).copied();
+    let known = known
+        .or_else(|| listed(&NAMES))
+        .or_else(|| exactly(&OTHER_SCALE))
+        .or_else(|| {
+            let mut all = KNOWN.iter();
+            all.find(|known| known.eq_ignore_ascii_case(name)).copied()
+        })?;
+    Some(if power.is_empty() {
+        known.to_owned()
+    } else {
+        format!("{known}^{power}")
+    })
+}
+
 /// The unit that was probably meant, in the spelling of the contract.
 fn meant(text: &str) -> Option<String> {
-    const NAMES: [(&str, &str); 13] = [
-        ("°", "deg"),
-        ("degree", "deg"),
-        ("degrees", "deg"),
-        ("radian", "rad"),
-        ("radians", "rad"),
-        ("%", "-"),
-        ("sec", "s"),
-        ("hr", "h"),
-        ("day", "d"),
-        ("days", "d"),
-        ("meter", "m"),
-        ("metre", "m"),
-        ("none", "-"),
-    ];
-    const OTHER_SCALE: [(&str, &str); 6] = [
-        ("Pa", "kPa"),
-        ("MPa", "kPa"),
-        ("GPa", "kPa"),
-        ("N", "kN"),
-        ("MN", "kN"),
-        ("cm", "m"),
-    ];
-    let spelled = |factor: &str| -> Option<String> {
-        let plain: String = factor
-            .chars()
-            .map(|c| match c {
-                '²' => '2',
-                '³' => '3',
-                other => other,
-            })
-            .collect();
-        let digits = plain.find(|c: char| c.is_ascii_digit() || c == '^' || c == '-');
-        let (name, power) = plain.split_at(digits.filter(|&at| at > 0).unwrap_or(plain.len()));
-        let power = power.trim_start_matches('^');
-        let listed = |table: &[(&str, &'static str)]| {
-            let mut rows = table.iter();
-            rows.find(|(known, _)| known.eq_ignore_ascii_case(name))
-                .map(|(_, right)| *right)
-        };
-        let exactly = |table: &[(&str, &'static str)]| {
-            let mut rows = table.iter();
-            rows.find(|(known, _)| *known == name)
-                .map(|(_, right)| *right)
-        };
-        let known = KNOWN.iter().find(|known| **known == name).copied();
-        let known = known
-            .or_else(|| listed(&NAMES))
-            .or_else(|| exactly(&OTHER_SCALE))
-            .or_else(|| {
-                let mut all = KNOWN.iter();
-                all.find(|known| known.eq_ignore_ascii_case(name)).copied()
-            })?;
-        Some(if power.is_empty() {
-            known.to_owned()
-        } else {
-            format!("{known}^{power}")
-        })
-    };
     let mut right = String::new();
     let mut factor = String::new();
     for c in text.trim().chars().chain(['\0']) {

@@ -187,6 +187,33 @@ pub(super) fn run(
     })
 }
 
+/// The answer of a child that has ended, or how.
+fn ended(answer: Option<Answer>, outcome: &child::Outcome, (id, folder): (&str, &Path)) -> Answer {
+    let ending = outcome.ending;
+    match answer {
+        Some(answer) if ending == Ending::Exited(0) => {
+            let passed = answer.outcome == Outcome::Passed;
+            match passed.then(|| afterwards(id, outcome, folder)).flatten() {
+                Some(details) => Answer {
+                    outcome: Outcome::Failed,
+                    details,
+                    ..answer
+                },
+                None => answer,
+            }
+        }
+        Some(_) => Answer::crashed(format!("the process ended with {ending} after the check")),
+        None => {
+            let stderr = String::from_utf8_lossy(&outcome.stderr);
+            let last = stderr.lines().rfind(|line| !line.trim().is_empty());
+            let last = last.map_or(String::new(), |line| format!(": {}", line.trim()));
+            Answer::crashed(format!(
+                "the process ended with {ending} before it could answer{last}"
+            ))
+        }
+    }
+}
+
 /// The answer of a child, or how it ended.
 pub(super) fn ask(
     check: &Check,
@@ -214,36 +241,15 @@ pub(super) fn ask(
     .map_err(internal)?;
     let answer = file::read_text(&answered(&calls)).ok();
     let answer = answer.and_then(|text| serde_json::from_slice::<Answer>(&text).ok());
-    let mut answer = match (answer, outcome.ending) {
-        (_, Ending::TimedOut) => {
+    let mut answer = match outcome.ending {
+        Ending::TimedOut => {
             let limit = arguments.time_limit;
             Answer {
                 is_late: true,
                 ..Answer::crashed(format!("it did not return within {limit} s"))
             }
         }
-        (Some(answer), Ending::Exited(0)) if answer.outcome == Outcome::Passed => {
-            match afterwards(check.id, &outcome, &folder) {
-                Some(details) => Answer {
-                    outcome: Outcome::Failed,
-                    details,
-                    ..answer
-                },
-                None => answer,
-            }
-        }
-        (Some(answer), Ending::Exited(0)) => answer,
-        (Some(_), ending) => {
-            Answer::crashed(format!("the process ended with {ending} after the check"))
-        }
-        (None, ending) => {
-            let stderr = String::from_utf8_lossy(&outcome.stderr);
-            let last = stderr.lines().rfind(|line| !line.trim().is_empty());
-            let last = last.map_or(String::new(), |line| format!(": {}", line.trim()));
-            Answer::crashed(format!(
-                "the process ended with {ending} before it could answer{last}"
-            ))
-        }
+        _ => ended(answer, &outcome, (check.id, &folder)),
     };
     if answer.outcome == Outcome::Crashed && arguments.at.is_none() {
         let limit = Duration::from_secs_f64(arguments.time_limit.min(10.0));

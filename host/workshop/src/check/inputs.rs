@@ -90,6 +90,29 @@ impl Results<'_> {
         let probe = self.specimen.with_values(&values)?;
         probe.as_ref().map(|probe| self.of(probe)).transpose()
     }
+
+    /// Tries other values of one parameter until the results differ from these.
+    fn vary(
+        &self,
+        (p, i): (&ParameterDescription, usize),
+        base: &[f64],
+        before: &[PointEnd],
+        tried: &mut Tried,
+    ) -> Result<(), Verdict> {
+        for other in others(p, base[i]) {
+            if other.to_bits() == base[i].to_bits() || !p.bounds.contain(other) {
+                continue;
+            }
+            if let Some(ends) = self.with(base, i, other)? {
+                tried.is_tried = true;
+                tried.matters |= ends.iter().zip(before).any(|(a, b)| !is_same(a, b));
+            }
+            if tried.matters {
+                break;
+            }
+        }
+        Ok(())
+    }
 }
 
 /// Whether a parameter was tried, and mattered.
@@ -126,19 +149,7 @@ fn parameters_matter(subject: &Subject) -> Found {
                     Some(before) => before,
                     None => &*expected.insert(results.of(&probe)?),
                 };
-                for other in others(p, base[i]) {
-                    if other.to_bits() == base[i].to_bits() || !p.bounds.contain(other) {
-                        continue;
-                    }
-                    let Some(ends) = results.with(&base, i, other)? else {
-                        continue;
-                    };
-                    entry.is_tried = true;
-                    entry.matters |= ends.iter().zip(before).any(|(a, b)| !is_same(a, b));
-                    if entry.matters {
-                        break;
-                    }
-                }
+                results.vary((p, i), &base, before, entry)?;
                 let among = |value| results.with(&base, i, value);
                 if entry.matters && may_be_rounded(p) && is_rounded(p, base[i], among)? {
                     return Err(warned(format!(

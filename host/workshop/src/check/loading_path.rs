@@ -338,11 +338,8 @@ impl Specimen {
             free[random.below(free.len())]
         };
         let holds = !random.once_in(4) && (driven > 0 || !is_interface);
-        let held: Vec<usize> = free
-            .iter()
-            .copied()
-            .filter(|&c| holds && c < n_normal && c != driven)
-            .collect();
+        let others = free.into_iter().filter(|c| *c != driven);
+        let (held, rest): (Vec<_>, Vec<_>) = others.partition(|&c| holds && c < n_normal);
         let far = if is_interface { FAR_JUMP } else { FAR_STRAIN };
         let opens = is_interface && driven == 0;
         let reach = if held.is_empty() && !opens {
@@ -355,11 +352,6 @@ impl Specimen {
         } else {
             -1.0
         };
-        let rest: Vec<usize> = free
-            .iter()
-            .copied()
-            .filter(|c| *c != driven && !held.contains(c))
-            .collect();
         let mut led = Led {
             drift: vec![0.0; start.flux0.len()],
             rest,

@@ -164,10 +164,6 @@ fn memory_is_freed(subject: &Subject) -> Found {
             specimen.law.probe(&form)?;
             Ok(())
         };
-        let init = || -> Result<(), Verdict> {
-            specimen.probe.init_state(&fluxes, &Form::of(0))?;
-            Ok(())
-        };
         let kinds: [(&str, Work<'_>); 5] = [
             ("a call of `integrate`", &|| {
                 specimen.call(&point, UPDATE).map(drop)
@@ -175,7 +171,10 @@ fn memory_is_freed(subject: &Subject) -> Found {
             ("a call of `integrate` that fails", &|| {
                 specimen.call(&broken, UPDATE).map(drop)
             }),
-            ("a call of `init_state`", &init),
+            ("a call of `init_state`", &|| {
+                specimen.probe.init_state(&fluxes, &Form::of(0))?;
+                Ok(())
+            }),
             ("an instance", &|| create(&specimen.values)),
             ("`create` that refuses", &|| create(&refused)),
         ];

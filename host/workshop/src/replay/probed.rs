@@ -7,10 +7,11 @@ use crate::check::specimen::create_form;
 use crate::check::{refusal, refusal_in};
 use crate::scratch::Scratch;
 use crate::{Error, internal};
+use abi::Hypothesis;
 use law::capsule::Capsule;
 use law::probe::call_log::Function;
 use law::probe::{Answer, Form, PointEnd, PointStart, Probe};
-use law::{LoadedLaw, Opener, Trust};
+use law::{FormulationDescription, LoadedLaw, Opener, Trust};
 use std::path::Path;
 use std::time::Duration;
 
@@ -108,19 +109,55 @@ impl Report<'_> {
     }
 }
 
-/// Repeats the call in this process, once more, and in other ways that must not matter.
-fn inside(capsule: &Capsule, loaded: &LoadedLaw, report: &mut Report<'_>) -> Result<(), Error> {
+fn formulation<'a>(
+    capsule: &Capsule,
+    loaded: &'a LoadedLaw,
+) -> Result<(Hypothesis, &'a FormulationDescription), Error> {
     let wrong = |message: String| Error::from(capsule.error(&["law", "hypothesis"], message));
     let hypothesis = capsule.hypothesis().ok_or_else(|| {
-        wrong(format!(
-            "there is no hypothesis `{}`",
-            capsule.law.hypothesis
-        ))
+        let name = &capsule.law.hypothesis;
+        wrong(format!("there is no hypothesis `{name}`"))
     })?;
-    let formulation = loaded
-        .description()
-        .formulation(hypothesis)
-        .ok_or_else(|| wrong(format!("law `{}` does not offer it", capsule.law.id)))?;
+    let formulation = loaded.description().formulation(hypothesis);
+    let formulation =
+        formulation.ok_or_else(|| wrong(format!("law `{}` does not offer it", capsule.law.id)))?;
+    Ok((hypothesis, formulation))
+}
+
+/// A failure of the call, or a fault of the law that further calls show.
+fn found(
+    first: &Answer,
+    formulation: &FormulationDescription,
+    [points, before]: [&[PointStart]; 2],
+    call: impl FnMut(&[PointStart]) -> Result<Vec<PointEnd>, Error>,
+) -> Result<Option<String>, Error> {
+    if first.points.iter().any(|end| !is_success(end.status)) {
+        let why = refusal(first.status, first.text().as_deref());
+        return Ok(Some(format!("outcome   {why}")));
+    }
+    let variables = formulation.internal_variables.iter();
+    let ids: Vec<&str> = variables.map(|v| v.id.as_str()).collect();
+    fault(&first.points, &ids, [points, before], call)
+}
+
+/// Ends an instance after the call that came before.
+fn destroyed(probe: Probe, points: &[PointStart], form: &Form) -> Result<(), Error> {
+    let is_of_start = points.iter().all(|point| point.gradient1.is_empty());
+    let before = if is_of_start {
+        Function::InitState
+    } else {
+        Function::Integrate
+    };
+    if !points.is_empty() {
+        called(&probe, before, points, form)?;
+    }
+    drop(probe);
+    Ok(())
+}
+
+/// Repeats the call in this process, once more, and in other ways that must not matter.
+fn inside(capsule: &Capsule, loaded: &LoadedLaw, report: &mut Report<'_>) -> Result<(), Error> {
+    let (hypothesis, formulation) = formulation(capsule, loaded)?;
     let values = super::parameters(capsule, loaded)?;
     let [points, before] = capsule.batch(hypothesis, formulation)?;
     let created = loaded
@@ -142,38 +179,22 @@ fn inside(capsule: &Capsule, loaded: &LoadedLaw, report: &mut Report<'_>) -> Res
     match function {
         Function::Create => report.finds_no_fault(),
         Function::Destroy => {
-            let is_of_start = points.iter().all(|point| point.gradient1.is_empty());
-            let before = if is_of_start {
-                Function::InitState
-            } else {
-                Function::Integrate
-            };
-            if !points.is_empty() {
-                called(&probe, before, &points, &form)?;
-            }
-            drop(probe);
+            destroyed(probe, &points, &form)?;
             report.returns()?;
             report.finds_no_fault()
         }
         Function::InitState | Function::Integrate => {
-            let Some(first) = called(&probe, function, &points, &form)? else {
+            let call = |points: &[PointStart]| called(&probe, function, points, &form);
+            let Some(first) = call(&points)? else {
                 let why = format!("law `{}` has no `init_state`", capsule.law.id);
                 return Err(Error::library(why));
             };
             report.returns()?;
-            if first.points.iter().any(|end| !is_success(end.status)) {
-                let why = refusal(first.status, first.text().as_deref());
-                report.say(&format!("outcome   {why}"));
-                return Err(fails(capsule, "internal"));
-            }
-            let variables = formulation.internal_variables.iter();
-            let ids: Vec<&str> = variables.map(|v| v.id.as_str()).collect();
-            let call = |points: &[PointStart]| -> Result<Vec<PointEnd>, Error> {
-                let answer = called(&probe, function, points, &form)?;
-                Ok(answer.map_or(Vec::new(), |answer| answer.points))
+            let ends = |points: &[PointStart]| {
+                Ok(call(points)?.map_or(Vec::new(), |answer| answer.points))
             };
-            if let Some(fault) = fault(&first.points, &ids, [&points, &before], call)? {
-                report.say(&fault);
+            if let Some(found) = found(&first, formulation, [&points, &before], ends)? {
+                report.say(&found);
                 return Err(fails(capsule, "internal"));
             }
             report.finds_no_fault()?;

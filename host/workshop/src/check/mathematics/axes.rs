@@ -9,6 +9,7 @@ use crate::check::specimen::{Specimen, create_form, hypotheses};
 use crate::check::{Found, Subject, Verdict, counted, margins, refusal};
 use abi::Hypothesis;
 use abi::raw;
+use law::FormulationDescription;
 use law::probe::PointStart;
 use nalgebra::{DMatrix, DVector};
 
@@ -27,35 +28,37 @@ pub(in crate::check) fn routine_agrees_in_the_plane(subject: &Subject) -> Found 
     counted(n, "increments", none)
 }
 
+/// The formulation of the law with the same internal variables in more components, if it offers one.
+fn larger(specimen: &Specimen) -> Option<(FormulationDescription, Hypothesis)> {
+    let wanted = match specimen.hypothesis {
+        Hypothesis::PlaneStrain if specimen.adapter().is_some() => &[Hypothesis::ThreeD][..],
+        Hypothesis::PlaneStrain => &[Hypothesis::ThreeD, Hypothesis::Axisymmetric],
+        Hypothesis::Axisymmetric => &[Hypothesis::ThreeD],
+        Hypothesis::Interface2d => &[Hypothesis::Interface3d],
+        _ => return None,
+    };
+    let mut offered = hypotheses(&specimen.law);
+    let at = wanted
+        .iter()
+        .find_map(|h| offered.iter().position(|(_, other)| other == h))?;
+    let larger = offered.swap_remove(at);
+    let ids = |f: &FormulationDescription| -> Vec<String> {
+        f.internal_variables.iter().map(|v| v.id.clone()).collect()
+    };
+    (ids(&larger.0) == ids(&specimen.formulation)).then_some(larger)
+}
+
 /// Compares steps with the same in more components, if the law offers that. How many.
 fn agrees(
     specimen: &Specimen,
     steps: impl FnOnce() -> Result<Vec<Step>, Verdict>,
 ) -> Result<usize, Verdict> {
-    let is_routine = specimen.adapter().is_some();
-    let wanted = match specimen.hypothesis {
-        Hypothesis::PlaneStrain if is_routine => &[Hypothesis::ThreeD][..],
-        Hypothesis::PlaneStrain => &[Hypothesis::ThreeD, Hypothesis::Axisymmetric],
-        Hypothesis::Axisymmetric => &[Hypothesis::ThreeD],
-        Hypothesis::Interface2d => &[Hypothesis::Interface3d],
-        _ => return Ok(0),
-    };
-    let offered = hypotheses(&specimen.law);
-    let larger = wanted
-        .iter()
-        .find_map(|h| offered.iter().find(|(_, other)| other == h));
-    let Some((formulation, hypothesis)) = larger else {
+    let Some((formulation, hypothesis)) = larger(specimen) else {
         return Ok(0);
     };
-    let ids = |f: &law::FormulationDescription| -> Vec<String> {
-        f.internal_variables.iter().map(|v| v.id.clone()).collect()
-    };
-    if ids(formulation) != ids(&specimen.formulation) {
-        return Ok(0);
-    }
-    let form = create_form(formulation, *hypothesis, &specimen.values);
+    let form = create_form(&formulation, hypothesis, &specimen.values);
     let Some(probe) = specimen.law.probe(&form)?.probe else {
-        if is_routine {
+        if specimen.adapter().is_some() {
             return Ok(0);
         }
         return Err(specimen.fails(format_args!(
@@ -223,6 +226,18 @@ fn note((name, part): (Option<&'static str>, f64)) {
     }
 }
 
+/// An initial flux with a direction, if the law can start there; else the pressure alone.
+fn directed(specimen: &Specimen, random: &mut Random) -> Result<Origin, Verdict> {
+    let origin = specimen.origin(random)?;
+    let pressure = largest(&origin.start.flux0);
+    let mut flux = origin.start.flux0.clone();
+    for (c, value) in flux.iter_mut().enumerate() {
+        let part = if c < specimen.n_normal() { 0.2 } else { 0.1 };
+        *value += part * pressure * random.between(-1.0, 1.0);
+    }
+    Ok(specimen.started(&flux)?.unwrap_or(origin))
+}
+
 /// Leads a point along a random path from an initial flux of any direction, and its image under a
 /// change of axes along that of the path. Increments at which both were compared.
 fn twin(
@@ -234,20 +249,11 @@ fn twin(
     twins: &Twins,
     random: &mut Random,
 ) -> Result<Result<usize, Unlike>, Verdict> {
-    let origin = specimen.origin(random)?;
-    // An initial flux with a direction, if the law can start there; else the pressure alone.
-    let pressure = largest(&origin.start.flux0);
-    let mut flux = origin.start.flux0.clone();
-    for (c, value) in flux.iter_mut().enumerate() {
-        let part = if c < specimen.n_normal() { 0.2 } else { 0.1 };
-        *value += part * pressure * random.between(-1.0, 1.0);
-    }
-    let directed = specimen.started(&flux)?.unwrap_or(origin);
     let Origin {
         start: mut first,
         stiffness,
         size,
-    } = directed;
+    } = directed(specimen, random)?;
     // A law may refuse what a little rounding adds.
     let Ok(image) = specimen.started(&turned(of_fluxes, &first.flux0))? else {
         return Ok(Ok(0));
@@ -261,12 +267,10 @@ fn twin(
         first.gradient1 = sum(&first.gradient0, &move_);
         second.gradient1 = sum(&second.gradient0, &turned(of_gradients, &move_));
         let answer = specimen.call(&[first.clone(), second.clone()], ELASTIC)?;
-        let Ok([a, b]) = <[_; 2]>::try_from(answer.points) else {
+        let follows = answer.points.iter().all(|end| is_success(end.status));
+        let (true, Ok([a, b])) = (follows, <[_; 2]>::try_from(answer.points)) else {
             return Ok(Ok(n));
         };
-        if !(is_success(a.status) && is_success(b.status)) {
-            return Ok(Ok(n));
-        }
         let expected = turned(of_fluxes, &a.flux);
         let scale = largest(&a.flux)
             .max(largest(&first.flux0))

@@ -8,6 +8,7 @@ use crate::check::specimen::Specimen;
 use crate::check::{Found, Subject, Verdict, refusal, skipped, warned};
 use abi::raw;
 use law::probe::{Form, PointRates, PointStart};
+use std::slice::from_ref;
 
 /// Error of rates, relative to those of the inputs times what differences show; these are good to
 /// about 10⁻⁸.
@@ -71,17 +72,36 @@ impl Direction {
     }
 }
 
+/// The largest error of rates against central differences, the largest difference between the two sides, both
+/// relative to the scales, and the number of the rate that is off most.
+fn compared(
+    rates: &[f64],
+    scales: &[f64],
+    [above, here, below]: [&[f64]; 3],
+    length: f64,
+) -> (f64, f64, usize) {
+    let (mut error, mut disagreement) = (0.0_f64, 0.0_f64);
+    let mut worst = 0;
+    for k in 0..rates.len() {
+        let by_differences = (above[k] - below[k]) / (2.0 * length);
+        let sides = (above[k] - 2.0 * here[k] + below[k]) / length;
+        let wrong = (by_differences - rates[k]).abs() / scales[k];
+        disagreement = disagreement.max(sides.abs() / scales[k]);
+        if wrong > error {
+            (error, worst) = (wrong, k);
+        }
+    }
+    (error, disagreement, worst)
+}
+
 /// Compares the rates of a step in a random direction with differences. `false`: at a kink.
 fn one_direction(specimen: &Specimen, step: &Step, random: &mut Random) -> Result<bool, Verdict> {
     let start = &step.start;
     let size = largest(&increment(start));
     let flux = largest(&start.flux0).max(step.stiffness * size);
     let Direction { point, parameter } = Direction::new(specimen, start, [size, flux], random);
-    let (answer, rates) = specimen.probe.rates(
-        std::slice::from_ref(start),
-        std::slice::from_ref(&point),
-        &parameter,
-    )?;
+    let (starts, directions) = (from_ref(start), from_ref(&point));
+    let (answer, rates) = specimen.probe.rates(starts, directions, &parameter)?;
     let ([end], [(flux_rate, state_rate)]) = (answer.points.as_slice(), rates.as_slice()) else {
         return Err(specimen.fails("no rates are written"));
     };
@@ -95,36 +115,20 @@ fn one_direction(specimen: &Specimen, step: &Step, random: &mut Random) -> Resul
         return Err(specimen.fails("with rates the update gives another flux"));
     }
     let found: Vec<f64> = flux_rate.iter().chain(state_rate).copied().collect();
-    let scales: Vec<f64> = found
-        .iter()
-        .enumerate()
-        .map(|(k, rate)| {
-            let least = if k < flux_rate.len() {
-                0.1 * flux
-            } else {
-                size
-            };
-            rate.abs().max(least)
-        })
-        .collect();
+    let scale = |(k, rate): (usize, &f64)| {
+        let is_flux = k < flux_rate.len();
+        rate.abs().max(if is_flux { 0.1 * flux } else { size })
+    };
+    let scales: Vec<f64> = found.iter().enumerate().map(scale).collect();
+    let here: Vec<f64> = end.flux.iter().chain(&end.state).copied().collect();
     let mut verdict = Ok(false);
     for length in LENGTHS {
         let moved = |sign: f64| moved_end(specimen, start, &point, &parameter, sign * length);
         let (Some(above), Some(below)) = (moved(1.0)?, moved(-1.0)?) else {
             continue;
         };
-        let here: Vec<f64> = end.flux.iter().chain(&end.state).copied().collect();
-        let (mut error, mut disagreement) = (0.0_f64, 0.0_f64);
-        let mut worst = 0;
-        for k in 0..found.len() {
-            let by_differences = (above[k] - below[k]) / (2.0 * length);
-            let sides = (above[k] - 2.0 * here[k] + below[k]) / length;
-            let wrong = (by_differences - found[k]).abs() / scales[k];
-            disagreement = disagreement.max(sides.abs() / scales[k]);
-            if wrong > error {
-                (error, worst) = (wrong, k);
-            }
-        }
+        let sides = [&above, &here, &below].map(Vec::as_slice);
+        let (error, disagreement, worst) = compared(&found, &scales, sides, length);
         if error <= RATE {
             return Ok(true);
         }

@@ -230,33 +230,39 @@ pub(in crate::check) fn counts(specimen: &Specimen, steps: &[Step], k: usize) ->
 const STARTS: usize = 24;
 const MOST_MOVE: f64 = 0.9;
 
+/// Points at rest under initial fluxes, of which the components that internal variables follow from are random.
+fn sheared(specimen: &Specimen, random: &mut Random) -> Result<Vec<Rest>, Verdict> {
+    let followed = followed(specimen)?;
+    let mut rests = Vec::new();
+    for _ in 0..STARTS {
+        let pressure = random.logarithmic(10.0, 1000.0);
+        let part = random.logarithmic(1e-3, 0.3);
+        let mut flux = specimen.under_pressure(pressure);
+        for (value, followed) in flux.iter_mut().zip(&followed) {
+            if *followed {
+                *value += part * pressure * random.between(-1.0, 1.0);
+            }
+        }
+        if let Ok(Origin { start, size, .. }) = specimen.started(&flux)? {
+            rests.push(Rest {
+                flux: ITERATED * pressure,
+                size,
+                before: start.state0.clone(),
+                may_change: vec![false; start.state0.len()],
+                told: start.clone(),
+                point: start,
+            });
+        }
+    }
+    Ok(rests)
+}
+
 pub(super) fn initial_states_fit(subject: &Subject) -> Found {
     let n = subject.each_by_default("initial fluxes", 4, |specimen, random| {
         if specimen.course.is_some() || specimen.probe.init_state(&[], &Form::of(0))?.is_none() {
             return Ok(0);
         }
-        let followed = followed(specimen)?;
-        let mut rests = Vec::new();
-        for _ in 0..STARTS {
-            let pressure = random.logarithmic(10.0, 1000.0);
-            let part = random.logarithmic(1e-3, 0.3);
-            let mut flux = specimen.under_pressure(pressure);
-            for (value, followed) in flux.iter_mut().zip(&followed) {
-                if *followed {
-                    *value += part * pressure * random.between(-1.0, 1.0);
-                }
-            }
-            if let Ok(Origin { start, size, .. }) = specimen.started(&flux)? {
-                rests.push(Rest {
-                    flux: ITERATED * pressure,
-                    size,
-                    before: start.state0.clone(),
-                    may_change: vec![false; start.state0.len()],
-                    told: start.clone(),
-                    point: start,
-                });
-            }
-        }
+        let rests = sheared(specimen, random)?;
         // A law that has the same state for all of them does not fit it to any.
         let mut pairs = rests.windows(2);
         if pairs.all(|pair| pair[0].before == pair[1].before) {

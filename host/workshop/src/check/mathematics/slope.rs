@@ -40,6 +40,7 @@ impl Entry {
 }
 
 /// Differences of one length.
+#[derive(Default)]
 struct Differences {
     n: usize,
     /// Entry by entry, by central differences.
@@ -66,10 +67,7 @@ impl Differences {
         let mut all = Self {
             n,
             slopes: vec![f64::NAN; n * n],
-            error: 0.0,
-            worst: None,
-            disagreement: 0.0,
-            left: None,
+            ..Self::default()
         };
         let sides = moved.chunks_exact(2).zip(ends.chunks_exact(2));
         for (&c, (moved, ends)) in columns.iter().zip(sides) {
@@ -84,27 +82,25 @@ impl Differences {
             for row in 0..n {
                 let [above, here, below] =
                     [&plus.flux, &step.end.flux, &minus.flux].map(|f| f[row]);
-                let by_differences = (above - below) / (up - down);
-                all.slopes[row * n + c] = by_differences;
-                let by_law = step.end.tangent[row * n + c];
-                let wrong = (by_differences - by_law).abs();
+                let entry = Entry {
+                    row,
+                    column: c,
+                    by_law: step.end.tangent[row * n + c],
+                    by_differences: (above - below) / (up - down),
+                };
+                all.slopes[row * n + c] = entry.by_differences;
                 let forward = (above - here) / up;
                 let backward = (here - below) / -down;
                 let stays = [above, below].iter().all(|f| f.to_bits() == here.to_bits());
                 // Of a length at which this much stiffness would show.
-                let shows = by_law.abs() * up > 1e3 * f64::EPSILON * here.abs();
-                if stays && shows && by_law.abs() > ROUND_OFF * scale {
+                let shows = entry.by_law.abs() * up > 1e3 * f64::EPSILON * here.abs();
+                if stays && shows && entry.by_law.abs() > ROUND_OFF * scale {
                     all.left = all.left.or(Some((row, c)));
                 }
                 all.disagreement = all.disagreement.max((forward - backward).abs());
+                let wrong = entry.off(1.0);
                 if wrong > all.error {
-                    all.error = wrong;
-                    all.worst = Some(Entry {
-                        row,
-                        column: c,
-                        by_law,
-                        by_differences,
-                    });
+                    (all.error, all.worst) = (wrong, Some(entry));
                 }
             }
         }
@@ -123,21 +119,27 @@ impl Differences {
     }
 }
 
-/// Compares the tangent of a step with differences of three lengths, two of which have to agree with
-/// each other where it is wrong.
-pub(super) fn slope(specimen: &Specimen, step: &Step, scale: f64) -> Result<Slope, Verdict> {
-    let size = largest(&increment(&step.start));
-    let columns: Vec<usize> = specimen.free().collect();
+/// A point moved by each of the lengths, as parts of this size, in each of these components, to both sides.
+fn to_both_sides(start: &PointStart, columns: &[usize], size: f64) -> Vec<PointStart> {
     let mut moved = Vec::new();
     for length in LENGTHS {
-        for &c in &columns {
+        for &c in columns {
             for sign in [1.0, -1.0] {
-                let mut point = step.start.clone();
+                let mut point = start.clone();
                 point.gradient1[c] += sign * length * size;
                 moved.push(point);
             }
         }
     }
+    moved
+}
+
+/// Compares the tangent of a step with differences of three lengths, two of which have to agree with
+/// each other where it is wrong.
+pub(super) fn slope(specimen: &Specimen, step: &Step, scale: f64) -> Result<Slope, Verdict> {
+    let size = largest(&increment(&step.start));
+    let columns: Vec<usize> = specimen.free().collect();
+    let moved = to_both_sides(&step.start, &columns, size);
     let ends = specimen.call(&moved, raw::PILUM_REQ_FLUX)?.points;
     let mut verdict = Slope::Kink;
     let mut left = None;

@@ -7,6 +7,7 @@ use crate::check::specimen::{BOTH, asked, name};
 use crate::check::{Found, Subject, Verdict};
 use abi::raw;
 use law::probe::{Form, PointEnd, PointStart, Probe};
+use std::slice::from_ref;
 
 pub(super) fn instances_are_independent(subject: &Subject) -> Found {
     let others = subject.specimens(3, &mut Random::new(subject.seed, "others"))?;
@@ -99,7 +100,7 @@ fn after_alike(
     point: &PointStart,
     unlike: &PointStart,
 ) -> Result<usize, Verdict> {
-    let one = |start: &PointStart, form: &Form| called.ask(std::slice::from_ref(start), form);
+    let one = |start: &PointStart, form: &Form| called.ask(from_ref(start), form);
     let Called { specimen, function } = called;
     let form = specimen.form(UPDATE);
     let calls = alike(point, form);
@@ -120,12 +121,23 @@ fn after_alike(
                 expected[0].state,
                 specimen.at(start)
             );
-            let starts = std::slice::from_ref(start);
-            let before = std::slice::from_ref(point);
+            let starts = from_ref(start);
+            let before = from_ref(point);
             return Err(specimen.fails_in(function, (starts, 0), (form_of_it, before), why));
         }
     }
     Ok(calls.len())
+}
+
+/// Parameters with a range of values that nobody has set.
+fn continuous(subject: &Subject, specimen: &Specimen) -> Vec<usize> {
+    let parameters = &specimen.law.description().parameters;
+    let varies = |i: &usize| {
+        let p = &parameters[*i];
+        let is_fixed = subject.settings.iter().any(|(id, _)| *id == p.id);
+        !is_fixed && p.choices.is_empty() && specimen.values[*i].is_finite()
+    };
+    (0..parameters.len()).filter(varies).collect()
 }
 
 /// The same with instances that differ in one parameter, and with one that stands where another
@@ -137,22 +149,11 @@ fn after_other_instances(
     unlike: &PointStart,
 ) -> Result<(), Verdict> {
     let form = Form::of(UPDATE);
-    let one = |probe: &Probe, start: &PointStart| -> Result<Vec<PointEnd>, Verdict> {
-        asked(probe, function, std::slice::from_ref(start), &form)
-    };
-    let parameters = specimen.law.description().parameters.iter().enumerate();
-    let varied: Vec<usize> = parameters
-        .filter(|(i, p)| {
-            let is_fixed = subject.settings.iter().any(|(id, _)| *id == p.id);
-            !is_fixed && p.choices.is_empty() && specimen.values[*i].is_finite()
-        })
-        .map(|(i, _)| i)
-        .collect();
+    let one = |probe: &Probe, start: &PointStart| asked(probe, function, from_ref(start), &form);
+    let varied = continuous(subject, specimen);
     let varying = |some: &[usize]| {
         let mut values = specimen.values.clone();
-        for &i in some {
-            values[i] *= 1.0 - 1e-3;
-        }
+        some.iter().for_each(|&i| values[i] *= 1.0 - 1e-3);
         specimen.with_values(&values)
     };
     // One whose parameters all differ makes a law forget what it kept of the others.
@@ -175,22 +176,17 @@ fn after_other_instances(
         forget()?;
         let own = one(&specimen.probe, point)?;
         let what = if first_difference(&expected, &found).is_some() {
-            format!(
-                "after the same call of an instance that differs in `{}` alone",
-                specimen.law.description().parameters[i].id
-            )
+            let id = &specimen.law.description().parameters[i].id;
+            format!("after the same call of an instance that differs in `{id}` alone")
         } else if there.is_some_and(|there| first_difference(&own, &there).is_some()) {
             "in an instance that stands where another one stood".to_owned()
         } else {
             continue;
         };
-        let why = format!(
-            "`{}` gives another result {what}, at {}",
-            name(function),
-            specimen.at(point)
-        );
-        let starts = std::slice::from_ref(point);
-        return Err(specimen.fails_in(function, (starts, 0), (&specimen.form(0), &[]), why));
+        let (called, at) = (name(function), specimen.at(point));
+        let why = format!("`{called}` gives another result {what}, at {at}");
+        let form = (&specimen.form(0), &[][..]);
+        return Err(specimen.fails_in(function, (from_ref(point), 0), form, why));
     }
     Ok(())
 }
