@@ -8,10 +8,10 @@ use crate::error::{InputError, exception, of_batch};
 use crate::state::{Memory, State};
 use crate::{task, value};
 use abi::Hypothesis;
-use batch::{copied, has_room};
+use batch::{has_room, repeated};
 use input::material::law_alone;
-use law::{BatchFailure, BuiltLaw, End, Moment, Opener, Operator, Start, Strided};
-use numpy::{PyArrayMethods, PyReadwriteArray1};
+use law::{BuiltLaw, Opener, Operator, Strided};
+use numpy::PyArrayMethods;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use std::path::PathBuf;
@@ -74,6 +74,33 @@ const KEYS: [&str; 12] = [
     "sha256",
     "initial",
 ];
+
+/// What a file would say of a law; what is no key of it is a parameter.
+fn table_of(
+    py: Python<'_>,
+    id: &str,
+    parameters: Option<&Bound<'_, PyAny>>,
+    values: Option<&Bound<'_, PyDict>>,
+) -> PyResult<toml::Table> {
+    let mut table = toml::Table::new();
+    table.insert("law".to_owned(), id.into());
+    let named = parameters.map(value::table).transpose()?;
+    let mut named = named.unwrap_or_default();
+    let values = values.map(|values| value::table(values.as_any()));
+    for (key, value) in values.transpose()?.into_iter().flatten() {
+        if KEYS.contains(&key.as_str()) {
+            table.insert(key, value);
+        } else if named.contains_key(&key) {
+            let message =
+                format!("parameter `{key}` is given twice: by its name, and in `parameters`");
+            return Err(exception(py, &input::Error::usage(message), None));
+        } else {
+            named.insert(key, value);
+        }
+    }
+    table.insert("parameters".to_owned(), named.into());
+    Ok(table)
+}
 
 fn hypothesis_named(name: &str) -> PyResult<Hypothesis> {
     let mut all = Hypothesis::ALL.into_iter();
@@ -153,27 +180,7 @@ impl Law {
         isolate: Option<f64>,
         values: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
-        let mut table = toml::Table::new();
-        table.insert("law".to_owned(), id.into());
-        let mut named = parameters
-            .map(value::table)
-            .transpose()?
-            .unwrap_or_default();
-        let values = values
-            .map(|values| value::table(values.as_any()))
-            .transpose()?;
-        for (key, value) in values.into_iter().flatten() {
-            if KEYS.contains(&key.as_str()) {
-                table.insert(key, value);
-            } else if named.contains_key(&key) {
-                let message =
-                    format!("parameter `{key}` is given twice: by its name, and in `parameters`");
-                return Err(exception(py, &input::Error::usage(message), None));
-            } else {
-                named.insert(key, value);
-            }
-        }
-        table.insert("parameters".to_owned(), named.into());
+        let mut table = table_of(py, id, parameters, values)?;
         let name = format!("Law(\"{id}\")");
         let source = Source::in_memory(&name, value::text_of(&table)?);
         let hypothesis = hypothesis.map(hypothesis_named).transpose()?;
@@ -241,36 +248,16 @@ impl Law {
             return Err(InputError::new_err(format!("time: {time} is no time")));
         }
         let n_variables = self.variables.len();
-        let internal = internal
-            .map(|internal| Rows::of(internal, "internal", n_variables))
-            .transpose()?;
-        let flux = flux.map(|flux| Rows::of(flux, "flux", n)).transpose()?;
-        let gradient = gradient
-            .map(|gradient| Rows::of(gradient, "gradient", n))
-            .transpose()?;
-        let most = [&flux, &gradient, &internal]
-            .into_iter()
-            .flatten()
-            .map(Rows::n_rows)
-            .max();
-        let n_points = points.or(most).unwrap_or(1);
+        let rows = |of: Option<_>, name, n| of.map(|of| Rows::of(of, name, n)).transpose();
+        let internal = rows(internal, "internal", n_variables)?;
+        let flux = rows(flux, "flux", n)?;
+        let gradient = rows(gradient, "gradient", n)?;
+        let given = [&flux, &gradient, &internal].into_iter().flatten();
+        let n_points = points.or(given.map(Rows::n_rows).max()).unwrap_or(1);
         has_room(n_points, 2 * n + n_variables)?;
-        let full = |rows: Option<Rows<'_>>, name: &str, n: usize| -> PyResult<Vec<f64>> {
-            let Some(rows) = rows else {
-                return Ok(vec![0.0; n_points * n]);
-            };
-            if rows.n_rows() == n_points {
-                let mut values = vec![0.0; n_points * n];
-                copied(rows.view()?, &mut values, n);
-                Ok(values)
-            } else if rows.n_rows() == 1 {
-                let mut one = vec![0.0; n];
-                copied(rows.view()?, &mut one, n);
-                Ok(one.repeat(n_points))
-            } else {
-                let message = format!("{name}: found {} rows, expected {n_points}", rows.n_rows());
-                Err(InputError::new_err(message))
-            }
+        let full = |rows: Option<Rows<'_>>, name, n| match rows {
+            None => Ok(vec![0.0; n_points * n]),
+            Some(rows) => repeated(&rows, name, [n_points, n]),
         };
         let flux = full(flux, "flux", n)?;
         let gradient = full(gradient, "gradient", n)?;
@@ -322,8 +309,7 @@ impl Law {
         copy: bool,
         positions: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyTuple>> {
-        let law = self.law();
-        let n = law.n_components();
+        let n = self.law().n_components();
         if !(dt >= 0.0 && dt.is_finite()) {
             return Err(InputError::new_err(format!("dt: {dt} is no time")));
         }
@@ -339,77 +325,16 @@ impl Law {
         };
         let n_points = from.n_points(py);
         let gradient = Rows::exactly(gradient, "gradient", [n_points, n])?;
-        if from.names != self.variables || from.n_components(py) != n {
-            return Err(InputError::new_err(
-                "state: it is one of another law, or of another hypothesis",
-            ));
-        }
-        if let (Some(state), Some(out)) = (state, out)
-            && state.is(out)
-        {
-            let message =
-                "out: the increment starts from this state; give one that is not needed any more";
-            return Err(InputError::new_err(message));
-        }
+        self.refuse_misfit(py, state, out)?;
         let mut end = self.memory_for(py, from, (&gradient, copy), out, n_operator)?;
         end.time = from.time + dt;
         end.increment = from.increment + 1;
         let sites = self.sites(n_points, positions)?;
-        {
-            let [start_gradient, start_flux, start_internal] = from.read(py)?;
-            let busy = |_| InputError::new_err("out: its memory is in use");
-            let own = (!end.is_lent).then(|| end.gradient.bind(py).try_readwrite());
-            let mut own = own.transpose().map_err(busy)?;
-            let mut end_flux = end.flux.bind(py).try_readwrite().map_err(busy)?;
-            let mut end_internal = end.internal.bind(py).try_readwrite().map_err(busy)?;
-            let mut operator: PyReadwriteArray1<'_, f64> =
-                end.operator.bind(py).try_readwrite().map_err(busy)?;
-            let rows = Strided::rows(n);
-            if let Some(out) = out {
-                out.get().note(Memory::Spoilt);
-            }
-            let start = Start {
-                n_points,
-                gradient: (start_gradient.as_slice()?, rows),
-                gradient_end: gradient.view()?,
-                flux: (start_flux.as_slice()?, rows),
-                state: start_internal.as_slice()?,
-                time: from.time,
-                time_increment: dt,
-                moment: Moment {
-                    step: 1,
-                    increment: end.increment,
-                    step_start: 0.0,
-                    step_length: end.time,
-                    is_undrained: false,
-                },
-                sites: &sites,
-            };
-            let results = End {
-                flux: (end_flux.as_slice_mut()?, rows),
-                state: end_internal.as_slice_mut()?,
-                operator: operator.as_slice_mut()?,
-            };
-            let reached = own.as_mut().map(|own| own.as_slice_mut()).transpose()?;
-            let outcome = self.calling(py, |law| {
-                let outcome = law.integrate(&start, wanted, results)?;
-                // The caller may use its array for the next increment.
-                if let Some(reached) = reached {
-                    copied(start.gradient_end, reached, n);
-                }
-                Ok::<_, BatchFailure>(outcome)
-            })?;
-            let success = outcome.map_err(|failure| of_batch(py, law, &failure))?;
-            if let Some(out) = out {
-                out.get().note(Memory::Given);
-            }
-            if let Some((point, why)) = success.unreliable {
-                let id = &law.description().id;
-                warn(
-                    py,
-                    &format!("law `{id}`, point {point} (from 0): inaccurate: {why}"),
-                )?;
-            }
+        let out = out.map(Bound::get);
+        let success = self.carry(py, [from, &end], (&gradient, dt), (wanted, &sites), out)?;
+        if let Some((point, why)) = success.unreliable {
+            let place = format!("law `{}`, point {point} (from 0)", self.id());
+            warn(py, &format!("{place}: inaccurate: {why}"))?;
         }
         let tangents = if n_operator == 0 {
             py.None().into_bound(py)

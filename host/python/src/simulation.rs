@@ -340,32 +340,27 @@ impl Simulation {
             let rows: Option<Vec<Vec<f64>>> = points.clone().map(of).collect();
             rows.map(|rows| rows.concat())
         };
-        let solid = [
+        let jump = |p| group.jump_and_traction(p).map(|(jump, _)| jump.to_vec());
+        let traction = |p| {
+            group
+                .jump_and_traction(p)
+                .map(|(_, traction)| traction.to_vec())
+        };
+        for (name, n, values) in [
             (
                 "stress",
-                rows(&|p| group.global_stress(p).map(|s| s.to_vec())),
+                4,
+                rows(&|p| Some(group.global_stress(p)?.to_vec())),
             ),
             (
                 "strain",
-                rows(&|p| group.global_strain(p).map(|s| s.to_vec())),
+                4,
+                rows(&|p| Some(group.global_strain(p)?.to_vec())),
             ),
-        ];
-        let interface = [
-            (
-                "jump",
-                rows(&|p| group.jump_and_traction(p).map(|(j, _)| j.to_vec())),
-            ),
-            (
-                "traction",
-                rows(&|p| group.jump_and_traction(p).map(|(_, t)| t.to_vec())),
-            ),
-        ];
-        for (values, n) in solid
-            .into_iter()
-            .zip([4, 4])
-            .chain(interface.into_iter().zip([2, 2]))
-        {
-            if let (name, Some(values)) = values {
+            ("jump", 2, rows(&jump)),
+            ("traction", 2, rows(&traction)),
+        ] {
+            if let Some(values) = values {
                 all.set_item(name, of_rows(py, &values, n)?)?;
             }
         }

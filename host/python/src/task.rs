@@ -59,6 +59,30 @@ impl<E> Caller<E> {
     }
 }
 
+/// Hears what the work says until it has ended, and looks up now and then: the first error of `take`, which
+/// hears no more then.
+fn heard_out<E>(
+    told: &Receiver<E>,
+    hear: &Sender<()>,
+    mut take: impl FnMut(Option<E>) -> PyResult<()>,
+) -> Option<PyErr> {
+    let mut raised = None;
+    loop {
+        let event = match told.recv_timeout(LOOK) {
+            Ok(event) => Some(event),
+            Err(RecvTimeoutError::Timeout) => None,
+            Err(RecvTimeoutError::Disconnected) => return raised,
+        };
+        let is_event = event.is_some();
+        if raised.is_none() {
+            raised = take(event).err();
+        }
+        if is_event {
+            let _ = hear.send(());
+        }
+    }
+}
+
 /// Carries out `work` and hands what it says to `listen`. The first exception, or that of a signal, asks the work to
 /// stop and is raised when it has.
 ///
@@ -88,27 +112,13 @@ pub(crate) fn carry_out<E: Send, T: Send>(
                 // The end of `caller` is the end of the work.
                 *done = Some(catch_unwind(AssertUnwindSafe(|| work(&caller))));
             });
-            loop {
-                let event = match told.recv_timeout(LOOK) {
-                    Ok(event) => Some(event),
-                    Err(RecvTimeoutError::Timeout) => None,
-                    Err(RecvTimeoutError::Disconnected) => break,
-                };
-                let is_event = event.is_some();
-                if raised.is_none() {
-                    let outcome = Python::attach(|py| {
-                        py.check_signals()?;
-                        event.map_or(Ok(()), |event| listen(py, event))
-                    });
-                    if let Err(error) = outcome {
-                        *raised = Some(error);
-                        asked.store(true, Ordering::Relaxed);
-                    }
-                }
-                if is_event {
-                    let _ = hear.send(());
-                }
-            }
+            *raised = heard_out(&told, &hear, |event| {
+                let outcome = Python::attach(|py| {
+                    py.check_signals()?;
+                    event.map_or(Ok(()), |event| listen(py, event))
+                });
+                outcome.inspect_err(|_| asked.store(true, Ordering::Relaxed))
+            });
         });
     });
     if let Some(error) = raised {
