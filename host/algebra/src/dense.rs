@@ -15,6 +15,23 @@ pub(crate) struct Exchanges {
     inverse: Vec<usize>,
 }
 
+impl Exchanges {
+    /// Further ones, among the rows from `start` on.
+    fn add(&mut self, start: usize, later: &Self) {
+        let rows = &mut self.forward[start..];
+        let exchanged: Vec<usize> = later.forward.iter().map(|&from| rows[from]).collect();
+        rows.copy_from_slice(&exchanged);
+    }
+
+    /// Sets the inverse.
+    fn invert(&mut self) {
+        self.inverse.resize(self.forward.len(), 0);
+        for (to, &from) in self.forward.iter().enumerate() {
+            self.inverse[from] = to;
+        }
+    }
+}
+
 /// Largest absolute value, looked for in eight places at once; values that are no numbers do not count.
 pub fn largest(values: &[f64]) -> f64 {
     let (eights, rest) = values.as_chunks::<8>();
@@ -91,23 +108,10 @@ fn factorise_by_blocks(mut matrix: MatMut<'_, f64>, exchanges: &mut Exchanges) {
         let width = width_at(start);
         let below = matrix.rb_mut().subrows_mut(start, n - start);
         let (left, rest) = below.split_at_col_mut(start);
-        let (block, mut rest) = rest.split_at_col_mut(width);
+        let (block, rest) = rest.split_at_col_mut(width);
         let (factor, below) = block.rb().split_at_row(width);
-        // The next block is most work, what stands left of this one least.
-        let mut parts = Vec::with_capacity(PARTS + 2);
-        if rest.ncols() > 0 {
-            let next;
-            (next, rest) = rest.split_at_col_mut(width_at(start + width));
-            parts.push(Beside::Next(next));
-        }
-        let per_part = rest.ncols().div_ceil(PARTS).next_multiple_of(8);
-        while rest.ncols() > 0 {
-            let part;
-            let width = per_part.min(rest.ncols());
-            (part, rest) = rest.split_at_col_mut(width);
-            parts.push(Beside::Right(part));
-        }
-        parts.push(Beside::Left(left));
+        let next = (rest.ncols() > 0).then(|| width_at(start + width));
+        let parts = beside(left, rest, next);
         let moves = of_block.forward.iter().copied().enumerate();
         let moves: Vec<(usize, usize)> = moves.filter(|(to, from)| to != from).collect();
         let subtract = |mut columns: MatMut<'_, f64>| {
@@ -132,18 +136,11 @@ fn factorise_by_blocks(mut matrix: MatMut<'_, f64>, exchanges: &mut Exchanges) {
                 Some(exchanges)
             }
         });
-        let exchanged = of_block.forward.iter();
-        let exchanged: Vec<usize> = exchanged
-            .map(|&from| exchanges.forward[start + from])
-            .collect();
-        exchanges.forward[start..].copy_from_slice(&exchanged);
+        exchanges.add(start, &of_block);
         of_block = of_parts.into_iter().flatten().next().unwrap_or_default();
         start += width;
     }
-    exchanges.inverse.resize(n, 0);
-    for (to, &from) in exchanges.forward.iter().enumerate() {
-        exchanges.inverse[from] = to;
-    }
+    exchanges.invert();
 }
 
 /// Columns to the right of a factorised block.
@@ -152,6 +149,30 @@ enum Beside<'m> {
     Right(MatMut<'m, f64>),
     /// Those of the block that follows.
     Next(MatMut<'m, f64>),
+}
+
+/// Parts of the columns beside a block; the next block, if there is one, of this width. That is most work, what stands
+/// left least.
+fn beside<'m>(
+    left: MatMut<'m, f64>,
+    mut rest: MatMut<'m, f64>,
+    next: Option<usize>,
+) -> Vec<Beside<'m>> {
+    let mut parts = Vec::with_capacity(PARTS + 2);
+    if let Some(width) = next {
+        let next;
+        (next, rest) = rest.split_at_col_mut(width);
+        parts.push(Beside::Next(next));
+    }
+    let per_part = rest.ncols().div_ceil(PARTS).next_multiple_of(8);
+    while rest.ncols() > 0 {
+        let part;
+        let width = per_part.min(rest.ncols());
+        (part, rest) = rest.split_at_col_mut(width);
+        parts.push(Beside::Right(part));
+    }
+    parts.push(Beside::Left(left));
+    parts
 }
 
 /// Exchanges rows of some columns: those that move, and where they come from.

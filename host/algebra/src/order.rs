@@ -86,6 +86,15 @@ pub(crate) fn choose(
     Ok(Order::Given(order.collect()))
 }
 
+/// The place of every number in an order of them.
+pub(crate) fn places(order: &[u32]) -> Vec<u32> {
+    let mut places = vec![0; order.len()];
+    for (at, &number) in (0..).zip(order) {
+        places[number as usize] = at;
+    }
+    places
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -8,6 +8,28 @@ use std::ops::Range;
 const WORTH_SHARING: usize = 50_000;
 const PARTS: usize = 4;
 
+/// Numbers by their group, of pairs of both: where each of `n` groups starts, and the end, and the numbers in the
+/// order in which they come.
+pub(crate) fn grouped(
+    n: usize,
+    pairs: impl Iterator<Item = (u32, u32)> + Clone,
+) -> (Vec<usize>, Vec<u32>) {
+    let mut start = vec![0; n + 1];
+    for (group, _) in pairs.clone() {
+        start[group as usize + 1] += 1;
+    }
+    for group in 0..n {
+        start[group + 1] += start[group];
+    }
+    let mut next = start.clone();
+    let mut numbers = vec![0; start[n]];
+    for (group, number) in pairs {
+        numbers[next[group as usize]] = number;
+        next[group as usize] += 1;
+    }
+    (start, numbers)
+}
+
 /// Compressed columns: row numbers, sorted, of every column.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Pattern {
@@ -42,21 +64,10 @@ impl Pattern {
                 equations.map(|equation| equation as u32).collect()
             })
             .collect();
-        let mut start = vec![0_usize; n + 1];
-        for &column in elements.iter().flatten() {
-            start[column as usize + 1] += 1;
-        }
-        for column in 0..n {
-            start[column + 1] += start[column];
-        }
-        let mut next = start.clone();
-        let mut of_column = vec![0_u32; start[n]];
-        for (number, equations) in elements.iter().enumerate() {
-            for &column in equations {
-                of_column[next[column as usize]] = number as u32;
-                next[column as usize] += 1;
-            }
-        }
+        let numbered = (0..).zip(&elements);
+        let pairs =
+            numbered.flat_map(|(number, columns)| columns.iter().map(move |&c| (c, number)));
+        let (start, of_column) = grouped(n, pairs);
         let mut pattern = Self {
             column_start: vec![0],
             rows: Vec::new(),

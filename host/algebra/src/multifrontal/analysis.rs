@@ -188,52 +188,13 @@ impl Analysis {
         starts: &[usize],
         eliminated_rows: &[Vec<u32>],
     ) {
-        let n_eliminated = self.order.len();
-        let n_fronts = eliminated_rows.len();
-        let mut front_of = vec![0_u32; n_eliminated];
-        for front in 0..n_fronts {
-            front_of[starts[front]..starts[front + 1]].fill(front as u32);
-        }
-        let mut children = vec![Vec::new(); n_fronts];
-        let mut parent = vec![None; n_fronts];
-        for (front, rows) in eliminated_rows.iter().enumerate() {
-            match rows.first() {
-                Some(&row) => {
-                    let above = front_of[row as usize] as usize;
-                    children[above].push(front);
-                    parent[front] = Some(above);
-                }
-                None => self.roots.push(front),
-            }
-        }
-        // Kept equations that a front touches: its own, and those of its children.
+        let (mut children, parent) = self.tree(starts, eliminated_rows);
         let mut touched_by = vec![u32::MAX; self.kept.len()];
-        for front in 0..n_fronts {
+        for front in 0..eliminated_rows.len() {
             let pivots = starts[front]..starts[front + 1];
-            let mut touched = Vec::new();
-            let mut touch = |row: u32, touched: &mut Vec<u32>| {
-                let mark = &mut touched_by[row as usize - n_eliminated];
-                if *mark != front as u32 {
-                    *mark = front as u32;
-                    touched.push(row);
-                }
-            };
-            for &child in &children[front] {
-                for &row in &self.rows[self.fronts_rows(child)] {
-                    if row as usize >= n_eliminated {
-                        touch(row, &mut touched);
-                    }
-                }
-            }
-            for &equation in &self.order[pivots.clone()] {
-                for &row in pattern.column(equation as usize) {
-                    let row = position[row as usize];
-                    if row as usize >= n_eliminated {
-                        touch(row, &mut touched);
-                    }
-                }
-            }
-            touched.sort_unstable();
+            let marks = (touched_by.as_mut_slice(), front as u32);
+            let columns = (pattern, position);
+            let touched = self.touched(columns, pivots.clone(), &children[front], marks);
             let start = self.rows.len();
             self.rows.extend_from_slice(&eliminated_rows[front]);
             self.rows.extend(touched);
@@ -257,6 +218,57 @@ impl Analysis {
         self.work = of_roots.sum();
         self.find_branches(&parent);
         self.place_rows(&parent);
+    }
+
+    /// Children and parent of each front: the parent eliminates the first row that the front leaves.
+    fn tree(
+        &mut self,
+        starts: &[usize],
+        rows: &[Vec<u32>],
+    ) -> (Vec<Vec<usize>>, Vec<Option<usize>>) {
+        let mut front_of = vec![0; self.order.len()];
+        for (front, pivots) in starts.windows(2).enumerate() {
+            front_of[pivots[0]..pivots[1]].fill(front);
+        }
+        let mut children = vec![Vec::new(); rows.len()];
+        let mut parent = vec![None; rows.len()];
+        for (front, rows) in rows.iter().enumerate() {
+            match rows.first() {
+                Some(&row) => {
+                    let above = front_of[row as usize];
+                    children[above].push(front);
+                    parent[front] = Some(above);
+                }
+                None => self.roots.push(front),
+            }
+        }
+        (children, parent)
+    }
+
+    /// Rows of kept equations that a front touches, its own, and those of its children. `touched_by`: the last
+    /// front that has touched each.
+    fn touched(
+        &self,
+        (pattern, position): (&Pattern, &[u32]),
+        pivots: Range<usize>,
+        children: &[usize],
+        (touched_by, front): (&mut [u32], u32),
+    ) -> Vec<u32> {
+        let n_eliminated = self.order.len();
+        let of_children = children.iter();
+        let of_children = of_children.flat_map(|&child| &self.rows[self.fronts_rows(child)]);
+        let equations = self.order[pivots].iter();
+        let own = equations.flat_map(|&equation| pattern.column(equation as usize));
+        let own = own.map(|&row| position[row as usize]);
+        let all = of_children.copied().chain(own);
+        let mut touched = Vec::new();
+        for row in all.filter(|&row| row as usize >= n_eliminated) {
+            if std::mem::replace(&mut touched_by[row as usize - n_eliminated], front) != front {
+                touched.push(row);
+            }
+        }
+        touched.sort_unstable();
+        touched
     }
 
     /// Shares the fronts among branches and what is above them.

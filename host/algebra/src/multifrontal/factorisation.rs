@@ -334,16 +334,8 @@ impl Multifrontal {
         let on_pile = numbered().filter(|(_, child)| child.update.is_empty());
         let size_of = |child: usize| analysis.fronts[child].rows.len().pow(2);
         let on_pile: usize = on_pile.map(|(&number, _)| size_of(number)).sum();
-        let update = match own {
-            Some(pile) if !front.is_retained => {
-                front.update = Vec::new();
-                pile.add(m * m)
-            }
-            _ => {
-                front.update.resize(m * m, 0.0);
-                &mut front.update
-            }
-        };
+        let own = own.filter(|_| !front.is_retained);
+        let update = room(&mut front.update, own, m * m);
         let mut from_pile = of_children.last(on_pile);
         let updates: Vec<Update<'_>> = numbered()
             .map(|(&number, child)| {
@@ -365,6 +357,17 @@ impl Multifrontal {
             pack(&mut front.values, k + m, k);
         }
         Ok(())
+    }
+}
+
+/// Room for what a front leaves: on a pile if there is one, else its own.
+fn room<'f>(update: &'f mut Vec<f64>, pile: Option<&'f mut Pile>, len: usize) -> &'f mut [f64] {
+    if let Some(pile) = pile {
+        *update = Vec::new();
+        pile.add(len)
+    } else {
+        update.resize(len, 0.0);
+        update
     }
 }
 

@@ -44,14 +44,11 @@ impl Supernodes {
             ..Default::default()
         };
         let chosen = order::choose(pattern, eliminated, lines, || minimum_degree(matrix))?;
-        let (forward, mut inverse);
+        let (forward, inverse);
         let ordering = match chosen {
             Order::MinimumDegree => SymmetricOrdering::Amd,
             Order::Given(order) => {
-                inverse = vec![0; n];
-                for (at, &unknown) in (0..).zip(&order) {
-                    inverse[unknown as usize] = at;
-                }
+                inverse = order::places(&order);
                 forward = order;
                 SymmetricOrdering::Custom(PermRef::new_checked(&forward, &inverse, n))
             }
@@ -66,10 +63,8 @@ impl Supernodes {
             Some(order) => order.arrays().0.to_vec(),
             None => (0..n as u32).collect(),
         };
-        let starts = supernodal
-            .supernode_begin()
-            .iter()
-            .map(|&start| start as usize);
+        let starts = supernodal.supernode_begin().iter();
+        let starts = starts.map(|&start| start as usize);
         Ok(Self {
             order: order.iter().map(|&new| eliminated[new as usize]).collect(),
             starts: starts.chain([n]).collect(),

@@ -2,6 +2,7 @@
 //! entries in every column of the factors (Gilbert, Ng & Peyton 1994).
 
 use super::graph::Compressed;
+use super::places;
 use crate::multifrontal::work;
 
 const NONE: u32 = u32::MAX;
@@ -13,10 +14,7 @@ pub(super) fn operations(compressed: &Compressed, order: &[u32]) -> f64 {
     let n = graph.n();
     let kept = (0..n as u32).filter(|&vertex| compressed.is_kept[vertex as usize]);
     let order: Vec<u32> = order.iter().copied().chain(kept).collect();
-    let mut position = vec![0_u32; n];
-    for (at, &vertex) in (0..).zip(&order) {
-        position[vertex as usize] = at;
-    }
+    let position = places(&order);
     let neighbours = |at: usize| {
         let of_vertex = graph.neighbours(order[at] as usize).iter();
         of_vertex.map(|&vertex| position[vertex as usize])
@@ -24,11 +22,33 @@ pub(super) fn operations(compressed: &Compressed, order: &[u32]) -> f64 {
     let weight = |at: usize| i64::from(graph.weights[order[at] as usize]);
     let parent = elimination_tree(n, neighbours);
     let post = postorder(&parent);
+    let mut counts = own_counts(&parent, &post, neighbours, weight);
+    let mut operations = 0.0;
+    for &column in &post {
+        let at = column as usize;
+        let above = parent[at];
+        if above != NONE {
+            counts[above as usize] += counts[at];
+        }
+        if !compressed.is_kept[order[at] as usize] {
+            operations += work(weight(at) as f64, (counts[at] - weight(at)) as f64);
+        }
+    }
+    operations
+}
 
+/// Weights that a column of the factors has more than the columns below it in the tree.
+fn own_counts<N: Iterator<Item = u32>>(
+    parent: &[u32],
+    post: &[u32],
+    neighbours: impl Fn(usize) -> N,
+    weight: impl Fn(usize) -> i64,
+) -> Vec<i64> {
+    let n = parent.len();
     // First descendants; a column without any is a leaf.
     let mut first = vec![NONE; n];
     let mut counts = vec![0_i64; n];
-    for (k, &column) in (0..).zip(&post) {
+    for (k, &column) in (0..).zip(post) {
         if first[column as usize] == NONE {
             counts[column as usize] = weight(column as usize);
         }
@@ -43,7 +63,7 @@ pub(super) fn operations(compressed: &Compressed, order: &[u32]) -> f64 {
     let mut latest_first = vec![NONE; n];
     let mut latest_leaf = vec![NONE; n];
     let mut ancestor: Vec<u32> = (0..n as u32).collect();
-    for &column in &post {
+    for &column in post {
         let above = parent[column as usize];
         if above != NONE {
             counts[above as usize] -= weight(column as usize);
@@ -58,33 +78,27 @@ pub(super) fn operations(compressed: &Compressed, order: &[u32]) -> f64 {
             counts[column as usize] += weight(row);
             let leaf = std::mem::replace(&mut latest_leaf[row], column);
             if leaf != NONE {
-                let mut meet = leaf;
-                while ancestor[meet as usize] != meet {
-                    meet = ancestor[meet as usize];
-                }
-                let mut up = leaf;
-                while up != meet {
-                    up = std::mem::replace(&mut ancestor[up as usize], meet);
-                }
-                counts[meet as usize] -= weight(row);
+                counts[meet(&mut ancestor, leaf) as usize] -= weight(row);
             }
         }
         if above != NONE {
             ancestor[column as usize] = above;
         }
     }
-    let mut operations = 0.0;
-    for &column in &post {
-        let at = column as usize;
-        let above = parent[at];
-        if above != NONE {
-            counts[above as usize] += counts[at];
-        }
-        if !compressed.is_kept[order[at] as usize] {
-            operations += work(weight(at) as f64, (counts[at] - weight(at)) as f64);
-        }
+    counts
+}
+
+/// Where the branch of a leaf meets what came after it; its ancestors then lead there at once.
+fn meet(ancestor: &mut [u32], leaf: u32) -> u32 {
+    let mut meet = leaf;
+    while ancestor[meet as usize] != meet {
+        meet = ancestor[meet as usize];
     }
-    operations
+    let mut up = leaf;
+    while up != meet {
+        up = std::mem::replace(&mut ancestor[up as usize], meet);
+    }
+    meet
 }
 
 /// Parents in the elimination tree (Liu 1986).

@@ -1,6 +1,7 @@
 //! The graph of a matrix with its unknowns gathered in vertices.
 
 use crate::Pattern;
+use crate::pattern::grouped;
 
 /// An undirected graph without loops.
 #[derive(Debug, Default)]
@@ -91,42 +92,19 @@ pub(super) struct Compressed {
     pub(super) graph: Graph,
     /// Unknowns of every vertex, ascending.
     unknowns: Vec<u32>,
-    starts: Vec<u32>,
+    starts: Vec<usize>,
     pub(super) is_kept: Vec<bool>,
 }
 
 impl Compressed {
     pub(super) fn new(pattern: &Pattern, kept: &[bool], lines: Option<&[[u32; 2]]>) -> Self {
-        let n = pattern.n();
-        let mut hashes = Vec::with_capacity(n);
-        for unknown in 0..n {
-            let rows = pattern.column(unknown);
-            let sum = rows
-                .iter()
-                .fold(0_u64, |sum, &row| sum.wrapping_add(mix(row)));
-            hashes.push(sum.wrapping_add(u64::from(kept[unknown])));
-        }
-        let (mut vertex_of, mut first) = (vec![0_u32; n], Vec::new());
-        for unknown in 0..n {
-            let rows = pattern.column(unknown);
-            // Unknowns with the same neighbours are neighbours.
-            let before = rows.iter().take_while(|&&row| (row as usize) < unknown);
-            let same = before.copied().find(|&row| {
-                let row = row as usize;
-                hashes[row] == hashes[unknown]
-                    && kept[row] == kept[unknown]
-                    && pattern.column(row) == rows
-            });
-            vertex_of[unknown] = if let Some(row) = same {
-                vertex_of[row as usize]
-            } else {
-                first.push(unknown as u32);
-                first.len() as u32 - 1
-            };
-        }
+        let (vertex_of, first) = alike(pattern, kept);
+        let pairs = vertex_of.iter().copied().zip(0..);
+        let (starts, unknowns) = grouped(first.len(), pairs);
+        let weights = starts.windows(2).map(|own| (own[1] - own[0]) as u32);
         let mut graph = Graph {
             start: vec![0],
-            weights: vec![0; first.len()],
+            weights: weights.collect(),
             ..Graph::default()
         };
         let mut met_from = vec![u32::MAX; first.len()];
@@ -149,19 +127,6 @@ impl Compressed {
             };
             graph.heights = vec![along(0), along(1)];
         }
-        for &vertex in &vertex_of {
-            graph.weights[vertex as usize] += 1;
-        }
-        let mut starts = vec![0_u32];
-        for weight in &graph.weights {
-            starts.push(starts[starts.len() - 1] + weight);
-        }
-        let mut next = starts.clone();
-        let mut unknowns = vec![0; n];
-        for (unknown, &vertex) in (0..).zip(&vertex_of) {
-            unknowns[next[vertex as usize] as usize] = unknown;
-            next[vertex as usize] += 1;
-        }
         Self {
             is_kept: first
                 .iter()
@@ -175,7 +140,7 @@ impl Compressed {
 
     /// Unknowns of a vertex.
     pub(super) fn unknowns(&self, vertex: usize) -> &[u32] {
-        &self.unknowns[self.starts[vertex] as usize..self.starts[vertex + 1] as usize]
+        &self.unknowns[self.starts[vertex]..self.starts[vertex + 1]]
     }
 
     /// Vertices sorted by the position of their first unknown in an order of unknowns.
@@ -198,6 +163,39 @@ impl Compressed {
         vertices.sort_unstable();
         vertices.into_iter().map(|(_, vertex)| vertex).collect()
     }
+}
+
+/// The vertex of every unknown, and the first unknown of every vertex: unknowns with the same neighbours are one,
+/// unless one of them is kept.
+fn alike(pattern: &Pattern, kept: &[bool]) -> (Vec<u32>, Vec<u32>) {
+    let n = pattern.n();
+    let mut hashes = Vec::with_capacity(n);
+    for unknown in 0..n {
+        let rows = pattern.column(unknown);
+        let sum = rows
+            .iter()
+            .fold(0_u64, |sum, &row| sum.wrapping_add(mix(row)));
+        hashes.push(sum.wrapping_add(u64::from(kept[unknown])));
+    }
+    let (mut vertex_of, mut first) = (vec![0_u32; n], Vec::new());
+    for unknown in 0..n {
+        let rows = pattern.column(unknown);
+        // Unknowns with the same neighbours are neighbours.
+        let before = rows.iter().take_while(|&&row| (row as usize) < unknown);
+        let same = before.copied().find(|&row| {
+            let row = row as usize;
+            hashes[row] == hashes[unknown]
+                && kept[row] == kept[unknown]
+                && pattern.column(row) == rows
+        });
+        vertex_of[unknown] = if let Some(row) = same {
+            vertex_of[row as usize]
+        } else {
+            first.push(unknown as u32);
+            first.len() as u32 - 1
+        };
+    }
+    (vertex_of, first)
 }
 
 /// Spreads a number over 64 bits (the finaliser of SplitMix64), so that sums tell sets apart.

@@ -9,19 +9,7 @@ use super::graph::Graph;
 /// everywhere, and is left like that.
 pub(super) fn order(graph: &Graph, part: &[u32], number: &mut [u32], order: &mut [u32]) {
     let n = part.len();
-    let mut all = part.to_vec();
-    for (new, &vertex) in (0..).zip(part) {
-        number[vertex as usize] = new;
-    }
-    for &vertex in part {
-        for &neighbour in graph.neighbours(vertex as usize) {
-            let new = &mut number[neighbour as usize];
-            if *new == u32::MAX {
-                *new = all.len() as u32;
-                all.push(neighbour);
-            }
-        }
-    }
+    let all = with_neighbours(graph, part, number);
     let words = all.len().div_ceil(64);
     let mut near = vec![0_u64; n * words];
     for (row, &vertex) in near.chunks_exact_mut(words.max(1)).zip(part) {
@@ -59,6 +47,24 @@ pub(super) fn order(graph: &Graph, part: &[u32], number: &mut [u32], order: &mut
             degrees[vertex] = degree(row);
         }
     }
+}
+
+/// The vertices of a part, and then those around it, numbered in this order.
+fn with_neighbours(graph: &Graph, part: &[u32], number: &mut [u32]) -> Vec<u32> {
+    let mut all = part.to_vec();
+    for (new, &vertex) in (0..).zip(part) {
+        number[vertex as usize] = new;
+    }
+    for &vertex in part {
+        for &neighbour in graph.neighbours(vertex as usize) {
+            let new = &mut number[neighbour as usize];
+            if *new == u32::MAX {
+                *new = all.len() as u32;
+                all.push(neighbour);
+            }
+        }
+    }
+    all
 }
 
 /// Numbers of the bits that are set.

@@ -47,6 +47,14 @@ impl Separated {
         self.sides[vertex] = side;
     }
 
+    /// Whether a vertex does not make a side too heavy, or the side is the lighter one.
+    fn has_room(&self, graph: &Graph, vertex: usize, side: u8) -> bool {
+        let [own, other] = [side, 1 - side].map(|side| self.weights[usize::from(side)]);
+        let total = (own + other + self.weights[2]) as f64;
+        let new = (own + i64::from(graph.weights[vertex])) as f64;
+        own < other || new <= LARGEST_SHARE * total
+    }
+
     /// By how much the separator becomes lighter if a vertex leaves it to this side, and its
     /// neighbours on the other side enter it.
     fn gain(&self, graph: &Graph, vertex: usize, side: u8) -> i64 {
@@ -72,64 +80,95 @@ pub(super) fn refine(graph: &Graph, separated: &mut Separated) {
     }
 }
 
-fn improve(graph: &Graph, separated: &mut Separated, moved_in: &mut [u8], round: u8) {
-    let mut moves: BinaryHeap<(i64, u32, u8)> = BinaryHeap::new();
-    for vertex in 0..graph.n() {
-        if separated.sides[vertex] == SEPARATOR {
-            for side in [0, 1] {
-                moves.push((separated.gain(graph, vertex, side), vertex as u32, side));
+/// One round of moves.
+struct Round<'a> {
+    graph: &'a Graph,
+    separated: &'a mut Separated,
+    /// The round in which each vertex has moved, if it has.
+    moved_in: &'a mut [u8],
+    number: u8,
+    /// By gain: vertices, and the side they move to. Entries are not taken out when the gain changes, but
+    /// compared when their turn comes.
+    moves: BinaryHeap<(i64, u32, u8)>,
+    /// What was changed since the best state: vertices, and where they were.
+    changes: Vec<(u32, u8)>,
+}
+
+impl Round<'_> {
+    /// Offers a vertex of the separator to these sides.
+    fn offer(&mut self, vertex: usize, sides: &[u8]) {
+        for &side in sides {
+            let gain = self.separated.gain(self.graph, vertex, side);
+            self.moves.push((gain, vertex as u32, side));
+        }
+    }
+
+    /// The vertex whose move gains most, and its side.
+    fn best(&mut self) -> Option<(usize, u8)> {
+        while let Some((gain, vertex, side)) = self.moves.pop() {
+            let v = vertex as usize;
+            if self.separated.sides[v] != SEPARATOR || self.moved_in[v] == self.number {
+                continue;
+            }
+            let now = self.separated.gain(self.graph, v, side);
+            if now < gain {
+                self.moves.push((now, vertex, side));
+            } else if self.separated.has_room(self.graph, v, side) {
+                return Some((v, side));
+            }
+        }
+        None
+    }
+
+    /// Moves a vertex; its neighbours on the other side enter the separator.
+    fn carry_out(&mut self, vertex: usize, side: u8) {
+        let graph = self.graph;
+        self.moved_in[vertex] = self.number;
+        self.separated.put(graph, vertex, side);
+        self.changes.push((vertex as u32, SEPARATOR));
+        for &neighbour in graph.neighbours(vertex) {
+            let u = neighbour as usize;
+            if self.separated.sides[u] != 1 - side {
+                continue;
+            }
+            self.separated.put(graph, u, SEPARATOR);
+            self.changes.push((neighbour, 1 - side));
+            if self.moved_in[u] != self.number {
+                self.offer(u, &[0, 1]);
+            }
+            // It no longer enters with its neighbours in the separator.
+            for &third in graph.neighbours(u) {
+                let t = third as usize;
+                if self.separated.sides[t] == SEPARATOR && self.moved_in[t] != self.number {
+                    self.offer(t, &[side]);
+                }
             }
         }
     }
+}
+
+fn improve(graph: &Graph, separated: &mut Separated, moved_in: &mut [u8], number: u8) {
+    let mut round = Round {
+        graph,
+        separated,
+        moved_in,
+        number,
+        moves: BinaryHeap::new(),
+        changes: Vec::new(),
+    };
+    for vertex in 0..graph.n() {
+        if round.separated.sides[vertex] == SEPARATOR {
+            round.offer(vertex, &[0, 1]);
+        }
+    }
     let mut since = 0;
-    let mut best = separated.cost();
-    // What was changed since then: vertices, and where they were.
-    let mut changes: Vec<(u32, u8)> = Vec::new();
-    while let Some((gain, vertex, side)) = moves.pop() {
-        let v = vertex as usize;
-        if separated.sides[v] != SEPARATOR || moved_in[v] == round {
-            continue;
-        }
-        // Entries are not taken out when the gain changes, but compared when their turn comes.
-        let now = separated.gain(graph, v, side);
-        if now < gain {
-            moves.push((now, vertex, side));
-            continue;
-        }
-        let (own, other) = (
-            separated.weights[usize::from(side)],
-            separated.weights[usize::from(1 - side)],
-        );
-        let total = (own + other + separated.weights[2]) as f64;
-        if own >= other && (own + i64::from(graph.weights[v])) as f64 > LARGEST_SHARE * total {
-            continue;
-        }
-        moved_in[v] = round;
-        separated.put(graph, v, side);
-        changes.push((vertex, SEPARATOR));
-        for &neighbour in graph.neighbours(v) {
-            let u = neighbour as usize;
-            if separated.sides[u] == 1 - side {
-                separated.put(graph, u, SEPARATOR);
-                changes.push((neighbour, 1 - side));
-                if moved_in[u] != round {
-                    for side in [0, 1] {
-                        moves.push((separated.gain(graph, u, side), neighbour, side));
-                    }
-                }
-                // It no longer enters with its neighbours in the separator.
-                for &third in graph.neighbours(u) {
-                    let t = third as usize;
-                    if separated.sides[t] == SEPARATOR && moved_in[t] != round {
-                        moves.push((separated.gain(graph, t, side), third, side));
-                    }
-                }
-            }
-        }
-        let cost = separated.cost();
+    let mut best = round.separated.cost();
+    while let Some((vertex, side)) = round.best() {
+        round.carry_out(vertex, side);
+        let cost = round.separated.cost();
         if cost < best {
             best = cost;
-            changes.clear();
+            round.changes.clear();
             since = 0;
         } else {
             since += 1;
@@ -138,7 +177,7 @@ fn improve(graph: &Graph, separated: &mut Separated, moved_in: &mut [u8], round:
             }
         }
     }
-    for (vertex, side) in changes.into_iter().rev() {
-        separated.put(graph, vertex as usize, side);
+    for (vertex, side) in round.changes.into_iter().rev() {
+        round.separated.put(graph, vertex as usize, side);
     }
 }
