@@ -75,21 +75,8 @@ impl CyclicJoint {
         };
         let end = self.faded(state.plastic_slip, d_xi);
         let sigma = trial.sigma - k_n * end.contraction;
-        // Eq. (7).
-        let resistance = resistance(self, &end, sigma);
-        if resistance <= 0.0 {
-            return Err(NO_TANGENT);
-        }
         let sign = 1.0_f64.copysign(trial.tau);
-        let by_opening = k_n * end.friction / resistance;
-        let by_slip = sign * k_t / resistance;
-        let tangent = [
-            [
-                k_n * (1.0 + end.contraction_rate * by_opening),
-                k_n * end.contraction_rate * by_slip,
-            ],
-            [-sign * k_t * by_opening, k_t * (1.0 - k_t / resistance)],
-        ];
+        let tangent = self.tangent(&end, sigma, sign)?;
         let state = State {
             plastic_slip: state.plastic_slip + d_xi,
             plastic_contraction: state.plastic_contraction + end.contraction,
@@ -98,6 +85,28 @@ impl CyclicJoint {
         // On the surface to the last bit.
         let traction = [-sigma, sign * end.friction * sigma];
         Ok(response(traction, state, tangent, &part))
+    }
+
+    /// Eq. (7) on the surface.
+    ///
+    /// # Errors
+    /// A smaller increment is asked for where there is none.
+    #[inline]
+    fn tangent(&self, end: &Faded, sigma: f64, sign: f64) -> Result<[[f64; 2]; 2], Failure> {
+        let (k_n, k_t) = (self.normal_stiffness, self.shear_stiffness);
+        let resistance = resistance(self, end, sigma);
+        if resistance <= 0.0 {
+            return Err(NO_TANGENT);
+        }
+        let by_opening = k_n * end.friction / resistance;
+        let by_slip = sign * k_t / resistance;
+        Ok([
+            [
+                k_n * (1.0 + end.contraction_rate * by_opening),
+                k_n * end.contraction_rate * by_slip,
+            ],
+            [-sign * k_t * by_opening, k_t * (1.0 - k_t / resistance)],
+        ])
     }
 
     /// Eq. (3), (4) after a further slip.

@@ -45,10 +45,8 @@ impl Interface {
         let Self {
             unloading: k_u,
             unloading_by_sigma: k_u_by_sigma,
-            loading_share: share,
-            failure_ratio: r_f,
             strength,
-            tan_delta,
+            ..
         } = *self;
         // Eq. (7).
         let trial = start.tau + k_u * start.slip;
@@ -77,8 +75,20 @@ impl Interface {
                 by_sigma: trial_by_sigma,
             };
         }
-        // Eq. (9): the excess is K_u times the slip that is left.
-        let direction = 1.0_f64.copysign(trial);
+        self.loaded(level, excess, 1.0_f64.copysign(trial), trial_by_sigma)
+    }
+
+    /// Along the hyperbola from a stress level, Eq. (9): the excess is `K_u` times the slip that is left.
+    #[inline]
+    fn loaded(&self, level: f64, excess: f64, direction: f64, trial_by_sigma: f64) -> Sheared {
+        let Self {
+            unloading: k_u,
+            loading_share: share,
+            failure_ratio: r_f,
+            strength,
+            tan_delta,
+            ..
+        } = *self;
         let a = share * excess / strength;
         let still = 1.0 - r_f * level;
         let ratio = 1.0 / (1.0 + r_f * a * still);

@@ -18,33 +18,49 @@ pub(crate) struct Bounds {
     pub(crate) residual_slope: f64,
 }
 
+impl Bounds {
+    /// Whether g has no root before the end of the interval.
+    pub(crate) fn has_no_root(&self, end: &Sample) -> bool {
+        self.residual_low > 0.0
+            || self.sigma_high < 0.0
+            || (self.residual_slope < 0.0 && end.residual > 0.0)
+    }
+}
+
+/// Bounds of β, and of the rate of contraction.
+struct ContractionRate {
+    beta_low: f64,
+    beta_high: f64,
+    /// Upper bound of w = β + Δλ β'.
+    rate_high: f64,
+}
+
 impl Increment<'_> {
-    /// Bounds between two samples of a leg.
-    pub(crate) fn bounds(&self, leg: &Leg, from: &Sample, to: &Sample) -> Bounds {
-        let Constants {
-            K_n,
-            K_t,
-            ref hardening,
-            ..
-        } = *self.constants;
-        let (travel_from, travel_to) = (from.d_lambda - leg.origin, to.d_lambda - leg.origin);
-        let (xi_from, xi_to) = (self.xi + from.d_lambda, self.xi + to.d_lambda);
-
-        // μ is monotonic on a leg; so is its slope under Eq. (10).
-        let (mu_low, mu_high) = (from.mu.min(to.mu), from.mu.max(to.mu));
-        let (slope_low, slope_high) = match (leg.branch, &hardening.softening) {
-            (Branch::Softening, Some(softening)) => {
-                let (sech_from, tanh_from) = sech_tanh(softening.rate * (xi_from - softening.u_tp));
-                let (sech_to, tanh_to) = sech_tanh(softening.rate * (xi_to - softening.u_tp));
-                let scale = (softening.mu_r - softening.mu_pk) * softening.rate;
-                let one = scale * sech_to * tanh_from;
-                let other = scale * (sech_from * tanh_to).min(0.5);
-                (one.min(other), one.max(other))
-            }
-            _ => (to.mu_slope, from.mu_slope),
+    /// Bounds of dμ/dξ, which is monotonic on a leg as well, under Eq. (10).
+    fn slope_bounds(&self, leg: &Leg, from: &Sample, to: &Sample) -> (f64, f64) {
+        let (Branch::Softening, Some(softening)) =
+            (leg.branch, &self.constants.hardening.softening)
+        else {
+            return (to.mu_slope, from.mu_slope);
         };
+        let at = |sample: &Sample| softening.rate * (self.xi + sample.d_lambda - softening.u_tp);
+        let (sech_from, tanh_from) = sech_tanh(at(from));
+        let (sech_to, tanh_to) = sech_tanh(at(to));
+        let scale = (softening.mu_r - softening.mu_pk) * softening.rate;
+        let one = scale * sech_to * tanh_from;
+        let other = scale * (sech_from * tanh_to).min(0.5);
+        (one.min(other), one.max(other))
+    }
 
-        // β before and after the characteristic state, and w = β + Δλ β'.
+    /// Bounds of β and w before and after the characteristic state.
+    fn contraction_rate(
+        &self,
+        [xi_from, xi_to]: [f64; 2],
+        [travel_from, travel_to]: [f64; 2],
+        [mu_low, mu_high]: [f64; 2],
+        slope_low: f64,
+    ) -> ContractionRate {
+        let hardening = &self.constants.hardening;
         let mu_c0 = hardening.mu_c0;
         let (sech_from, tanh_to, sech_to) = if mu_high > mu_c0 {
             let (sech_to, tanh_to) = hardening.stabilisation(xi_to);
@@ -53,33 +69,18 @@ impl Increment<'_> {
             (1.0, 1.0, 1.0)
         };
         let (before, after) = (mu_low < mu_c0, mu_high > mu_c0);
-        let beyond_low = (mu_low - mu_c0).max(0.0);
-        let beyond_high = (mu_high - mu_c0).max(0.0);
-        let beta_high = if before {
-            mu_c0 - mu_low
-        } else {
-            -beyond_low * sech_to
-        };
-        let beta_low = if after {
-            -beyond_high * sech_from
-        } else {
-            mu_c0 - mu_high
-        };
+        let [beyond_low, beyond_high] = [mu_low, mu_high].map(|mu| (mu - mu_c0).max(0.0));
         let mut rate_high = f64::NEG_INFINITY;
+        let (travel, sech) = if slope_low < 0.0 {
+            (travel_to, sech_from)
+        } else {
+            (travel_from, sech_to)
+        };
         if before {
-            let travel = if slope_low < 0.0 {
-                travel_to
-            } else {
-                travel_from
-            };
             rate_high = mu_c0 - mu_low - travel * slope_low;
         }
         if after || !before {
-            let hardening_part = if slope_low < 0.0 {
-                travel_to * slope_low * sech_from
-            } else {
-                travel_from * slope_low * sech_to
-            };
+            let hardening_part = travel * slope_low * sech;
             let q = travel_to * hardening.stabilisation_rate * tanh_to - 1.0;
             let stabilisation_part = if q > 0.0 {
                 (sech_from * q).min(STABILISATION_BOUND) * beyond_high
@@ -88,6 +89,40 @@ impl Increment<'_> {
             };
             rate_high = rate_high.max(stabilisation_part - hardening_part);
         }
+        ContractionRate {
+            beta_low: if after {
+                -beyond_high * sech_from
+            } else {
+                mu_c0 - mu_high
+            },
+            beta_high: if before {
+                mu_c0 - mu_low
+            } else {
+                -beyond_low * sech_to
+            },
+            rate_high,
+        }
+    }
+
+    /// Bounds between two samples of a leg.
+    pub(crate) fn bounds(&self, leg: &Leg, from: &Sample, to: &Sample) -> Bounds {
+        let Constants { K_n, K_t, .. } = *self.constants;
+        let (travel_from, travel_to) = (from.d_lambda - leg.origin, to.d_lambda - leg.origin);
+        let (xi_from, xi_to) = (self.xi + from.d_lambda, self.xi + to.d_lambda);
+
+        // μ is monotonic on a leg.
+        let (mu_low, mu_high) = (from.mu.min(to.mu), from.mu.max(to.mu));
+        let (slope_low, slope_high) = self.slope_bounds(leg, from, to);
+        let ContractionRate {
+            beta_low,
+            beta_high,
+            rate_high,
+        } = self.contraction_rate(
+            [xi_from, xi_to],
+            [travel_from, travel_to],
+            [mu_low, mu_high],
+            slope_low,
+        );
 
         let contraction_high = (leg.contraction
             + (travel_from * beta_high).max(travel_to * beta_high))

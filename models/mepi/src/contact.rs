@@ -10,6 +10,9 @@ use abi::{Failure, InterfacePoint, InterfaceResponse, Tangent};
 
 pub(crate) type Matrix = [[f64; 2]; 2];
 
+/// ∂(`σ_n`, τ)/∂(σ*, τ*) without flow.
+const ELASTIC: Matrix = [[1.0, 0.0], [0.0, 1.0]];
+
 /// The part of the increment that acts on a point in contact, compression and contraction positive.
 #[derive(Clone, Copy, Debug)]
 struct Contact {
@@ -109,53 +112,52 @@ fn close_or_slide(
     // Eq. (9).
     let strength = mu * sigma_trial;
     let round_off = 4.0 * f64::EPSILON * strength;
-    let elastic = [[1.0, 0.0], [0.0, 1.0]];
     if sigma_trial >= 0.0 && increment.tau <= strength + round_off {
-        return Ok(response(
-            constants,
-            contact,
-            [sigma_trial, tau_trial],
-            State { gap: 0.0, ..state },
-            elastic,
-        ));
+        let (trial, state) = ([sigma_trial, tau_trial], State { gap: 0.0, ..state });
+        return Ok(response(constants, contact, trial, state, ELASTIC));
     }
     if scheme != Scheme::Implicit && contact.sigma >= 0.0 {
         return substeps(constants, scheme, state, contact);
     }
+    flowed(&increment, state, contact, tau_trial, tangent)
+}
+
+/// After plastic flow, as far as it goes.
+#[inline]
+fn flowed(
+    increment: &Increment<'_>,
+    state: State,
+    contact: &Contact,
+    tau_trial: f64,
+    tangent: Tangent,
+) -> Result<InterfaceResponse<State>, Failure> {
+    let constants = increment.constants;
     let sign = 1.0_f64.copysign(tau_trial);
-    match increment.flow()? {
+    let (stress, state, by_trial) = match increment.flow()? {
         Flow::Slides(end) => {
             let sigma = end.sigma.max(0.0);
-            Ok(response(
-                constants,
-                contact,
-                [sigma, sign * end.mu * sigma],
-                slid(state, end.d_lambda, end.contraction),
-                if tangent == Tangent::Consistent {
-                    derivative(constants, &end, sign)?
-                } else {
-                    elastic
-                },
-            ))
+            let by_trial = if tangent == Tangent::Consistent {
+                derivative(constants, &end, sign)?
+            } else {
+                ELASTIC
+            };
+            let state = slid(state, end.d_lambda, end.contraction);
+            ([sigma, sign * end.mu * sigma], state, by_trial)
         }
         Flow::StopsAtPeak(end) => {
             let mut state = slid(state, end.d_lambda, end.contraction);
-            if let Some(softening) = hardening.softening {
+            if let Some(softening) = constants.hardening.softening {
                 state.plastic_slip = softening.u_tp;
             }
-            let tau = sign * (increment.tau - K_t * end.d_lambda);
-            Ok(response(
-                constants,
-                contact,
-                [end.sigma, tau],
-                state,
-                elastic,
-            ))
+            let tau = sign * (increment.tau - constants.K_t * end.d_lambda);
+            ([end.sigma, tau], state, ELASTIC)
         }
-        Flow::LosesContact { exhausted } => Ok(InterfaceResponse::open(lose_contact(
-            constants, state, contact, &increment, exhausted,
-        ))),
-    }
+        Flow::LosesContact { exhausted } => {
+            let state = lose_contact(constants, state, contact, increment, exhausted);
+            return Ok(InterfaceResponse::open(state));
+        }
+    };
+    Ok(response(constants, contact, stress, state, by_trial))
 }
 
 /// The flow by substeps. If it loses contact, the rest of the increment is left to the implicit
@@ -205,13 +207,8 @@ fn substeps(
         );
     }
     let by_trial = path.continuum_tangent(&end)?;
-    Ok(response(
-        constants,
-        contact,
-        [end.sigma, end.tau],
-        state,
-        by_trial,
-    ))
+    let stress = [end.sigma, end.tau];
+    Ok(response(constants, contact, stress, state, by_trial))
 }
 
 /// The state after plastic flow in contact, Eq. (14).

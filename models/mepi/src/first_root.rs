@@ -33,26 +33,20 @@ impl Increment<'_> {
                 end = limit;
                 width = end - from.d_lambda;
             }
-            let next = from.d_lambda + width;
-            let to = self.sample(&leg, if next < end { next } else { end });
+            let to = self.sample(&leg, end.min(from.d_lambda + width));
             if to.d_lambda <= from.d_lambda {
                 break;
             }
             let bounds = self.bounds(&leg, &from, &to);
-            let falls = bounds.residual_slope < 0.0;
             let in_contact = self.keeps_contact(bounds.contraction_high);
-            if falls && in_contact && to.residual <= 0.0 {
+            if bounds.residual_slope < 0.0 && in_contact && to.residual <= 0.0 {
                 return Ok(Flow::Slides(self.root_between(&leg, from, to)));
             }
-            let rootless = bounds.residual_low > 0.0
-                || bounds.sigma_high < 0.0
-                || (falls && to.residual > 0.0);
+            let rootless = bounds.has_no_root(&to);
             if rootless && !self.keeps_contact(to.contraction) {
                 let keeps = |x: f64| self.keeps_contact(self.sample(&leg, x).contraction);
-                let exhausted = last_that(keeps, from.d_lambda, to.d_lambda);
-                return Ok(Flow::LosesContact {
-                    exhausted: Some(exhausted),
-                });
+                let exhausted = Some(last_that(keeps, from.d_lambda, to.d_lambda));
+                return Ok(Flow::LosesContact { exhausted });
             }
             if rootless && in_contact {
                 width = 4.0 * (to.d_lambda - from.d_lambda);

@@ -153,30 +153,21 @@ impl Path<'_> {
         fraction: f64,
         nearly_lost: f64,
     ) -> Result<Attempt<Sliding>, Failure> {
+        let attempt = |end, error| Ok(Attempt { end, error });
         if from.loses_contact {
-            return Ok(Attempt {
-                end: *from,
-                error: 0.0,
-            });
+            return attempt(*from, 0.0);
         }
         let first = self.euler(from, &self.rates(from)?, fraction);
         if first.sigma < 0.0 {
             // Approached by ever smaller steps, then left to the implicit scheme.
             let close = from.sigma <= nearly_lost;
-            return Ok(Attempt {
-                end: Sliding {
-                    loses_contact: true,
-                    ..*from
-                },
-                error: if close { 0.0 } else { f64::INFINITY },
-            });
+            let mut end = *from;
+            end.loses_contact = true;
+            return attempt(end, if close { 0.0 } else { f64::INFINITY });
         }
         // A step so long that the rates at its end mean nothing is repeated smaller.
         let Ok(rates) = self.rates(&first) else {
-            return Ok(Attempt {
-                end: *from,
-                error: f64::INFINITY,
-            });
+            return attempt(*from, f64::INFINITY);
         };
         let second = self.euler(&first, &rates, fraction);
         let mean = |a: f64, b: f64| 0.5 * (a + b);
@@ -197,14 +188,14 @@ impl Path<'_> {
         if end.xi > from.xi {
             end = self.on_surface(end)?;
         }
-        Ok(Attempt {
+        attempt(
             end,
-            error: if end.xi > 0.0 {
+            if end.xi > 0.0 {
                 stress.max(slip)
             } else {
                 stress
             },
-        })
+        )
     }
 
     /// ∂(`σ_n`, τ)/∂(σ*, τ*) of the rate equations at the end of the increment.

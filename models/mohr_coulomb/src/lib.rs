@@ -121,74 +121,106 @@ impl MohrCoulomb {
         trial: [f64; N],
         tangent: Tangent,
     ) -> Result<SolidResponse<N, State>, Failure> {
-        let elastic = || SolidResponse {
+        if N == 4 {
+            self.in_plane(point, trial, tangent)
+        } else {
+            self.in_space(point, trial, tangent)
+        }
+    }
+
+    /// Eqs. (2), (3), (10) and (11), of one known principal axis.
+    #[inline]
+    fn in_plane<const N: usize>(
+        &self,
+        point: &SolidPoint<N, State>,
+        trial: [f64; N],
+        tangent: Tangent,
+    ) -> Result<SolidResponse<N, State>, Failure> {
+        let circle = MohrCircle::of(&trial);
+        let (largest, smallest) = circle.extremes();
+        if self.pyramid.admits(largest, smallest) {
+            return Ok(self.elastic(point, trial, tangent));
+        }
+        if self.scheme != Scheme::Implicit {
+            return self.substeps(point, &trial, tangent);
+        }
+        let principal = circle.principal();
+        let end = self.pyramid.return_stress(&principal.stress);
+        let consistent = || {
+            let M = self.pyramid.in_plane_M(end.zone, principal.pair);
+            let kappa = end.kappa(&principal.stress, principal.pair);
+            let shear = self.elasticity.G * kappa;
+            resized(principal.tangent(M, shear).map(resized))
+        };
+        let stress = resized(principal.compose(&end.stress));
+        let tangent = self.operator(tangent, consistent);
+        Ok(self.plastic(point, &(principal.stress - end.stress), stress, tangent))
+    }
+
+    /// The same of three principal axes.
+    #[inline]
+    fn in_space<const N: usize>(
+        &self,
+        point: &SolidPoint<N, State>,
+        trial: [f64; N],
+        tangent: Tangent,
+    ) -> Result<SolidResponse<N, State>, Failure> {
+        let (above, below) = spectral::bounds(&trial);
+        if self.pyramid.admits(above, below) {
+            return Ok(self.elastic(point, trial, tangent));
+        }
+        let principal = Spatial::of(&trial);
+        let s = &principal.stress;
+        if self.pyramid.admits(s[0], s[2]) {
+            return Ok(self.elastic(point, trial, tangent));
+        }
+        if self.scheme != Scheme::Implicit {
+            return self.substeps(point, &trial, tangent);
+        }
+        let end = self.pyramid.return_stress(s);
+        let consistent = || {
+            let shear = Pair::ALL.map(|pair| self.elasticity.G * end.kappa(s, pair));
+            let M = self.pyramid.M(end.zone);
+            resized(principal.tangent(M, shear).map(resized))
+        };
+        let stress = resized(principal.compose(&end.stress));
+        let tangent = self.operator(tangent, consistent);
+        Ok(self.plastic(point, &(s - end.stress), stress, tangent))
+    }
+
+    #[inline]
+    fn elastic<const N: usize>(
+        &self,
+        point: &SolidPoint<N, State>,
+        trial: [f64; N],
+        tangent: Tangent,
+    ) -> SolidResponse<N, State> {
+        SolidResponse {
             stress: trial,
             state: point.state,
             tangent: self.operator(tangent, || self.elasticity.operator()),
             unreliable: None,
-        };
-        let plastic = |trial: &Vector3<f64>, end: &Returned, stress, tangent| {
-            // Eq. (13).
-            let (shear, dilation) = self.elasticity.equivalent_strains(&(trial - end.stress));
-            SolidResponse {
-                stress,
-                state: State {
-                    plastic_strain: point.state.plastic_strain + shear,
-                    plastic_dilation: point.state.plastic_dilation + dilation,
-                },
-                tangent,
-                unreliable: None,
-            }
-        };
-        // Eqs. (2) and (3), (10), (11).
-        let Elasticity { G, .. } = self.elasticity;
-        if N == 4 {
-            let circle = MohrCircle::of(&trial);
-            let (largest, smallest) = circle.extremes();
-            if self.pyramid.admits(largest, smallest) {
-                return Ok(elastic());
-            }
-            if self.scheme != Scheme::Implicit {
-                return self.substeps(point, &trial, tangent);
-            }
-            let principal = circle.principal();
-            let end = self.pyramid.return_stress(&principal.stress);
-            let consistent = || {
-                let M = self.pyramid.in_plane_M(end.zone, principal.pair);
-                let kappa = end.kappa(&principal.stress, principal.pair);
-                resized(principal.tangent(M, G * kappa).map(resized))
-            };
-            let stress = resized(principal.compose(&end.stress));
-            Ok(plastic(
-                &principal.stress,
-                &end,
-                stress,
-                self.operator(tangent, consistent),
-            ))
-        } else {
-            let (above, below) = spectral::bounds(&trial);
-            if self.pyramid.admits(above, below) {
-                return Ok(elastic());
-            }
-            let principal = Spatial::of(&trial);
-            let s = &principal.stress;
-            if self.pyramid.admits(s[0], s[2]) {
-                return Ok(elastic());
-            }
-            if self.scheme != Scheme::Implicit {
-                return self.substeps(point, &trial, tangent);
-            }
-            let end = self.pyramid.return_stress(s);
-            let consistent = || {
-                let shear = Pair::ALL.map(|pair| G * end.kappa(s, pair));
-                resized(
-                    principal
-                        .tangent(self.pyramid.M(end.zone), shear)
-                        .map(resized),
-                )
-            };
-            let stress = resized(principal.compose(&end.stress));
-            Ok(plastic(s, &end, stress, self.operator(tangent, consistent)))
+        }
+    }
+
+    /// Eq. (13): what the return takes from the principal stresses is plastic strain.
+    #[inline]
+    fn plastic<const N: usize>(
+        &self,
+        point: &SolidPoint<N, State>,
+        relaxed: &Vector3<f64>,
+        stress: [f64; N],
+        tangent: [[f64; N]; N],
+    ) -> SolidResponse<N, State> {
+        let (shear, dilation) = self.elasticity.equivalent_strains(relaxed);
+        SolidResponse {
+            stress,
+            state: State {
+                plastic_strain: point.state.plastic_strain + shear,
+                plastic_dilation: point.state.plastic_dilation + dilation,
+            },
+            tangent,
+            unreliable: None,
         }
     }
 

@@ -43,6 +43,15 @@ pub(crate) struct Returned {
 }
 
 impl Returned {
+    #[inline]
+    fn to(zone: Zone, stress: [f64; 3], gaps: [f64; 2]) -> Self {
+        Self {
+            zone,
+            stress: stress.into(),
+            gaps,
+        }
+    }
+
     /// `κ_ij = (s_i − s_j)/(s_i* − s_j*)` of a pair: what the return leaves of a shear increment between
     /// the two principal axes, Eq. (11).
     #[inline]
@@ -98,11 +107,7 @@ impl Pyramid {
                 let s1 = self.s1_above(s3);
                 // Held in order: s₂ has the rounding of the trial stress.
                 let s2 = (s[1] - delta * self.face.g[1]).min(s1).max(s3);
-                return Returned {
-                    zone: Zone::Face,
-                    stress: Vector3::new(s1, s2, s3),
-                    gaps: [x, y],
-                };
+                return Returned::to(Zone::Face, [s1, s2, s3], [x, y]);
             }
         }
         // Eq. (6).
@@ -113,11 +118,7 @@ impl Pyramid {
             let gap = self.gap_above(s3);
             if gap >= 0.0 {
                 let s1 = self.s1_above(s3);
-                return Returned {
-                    zone: Zone::Edge12,
-                    stress: Vector3::new(s1, s1, s3),
-                    gaps: [0.0, gap],
-                };
+                return Returned::to(Zone::Edge12, [s1, s1, s3], [0.0, gap]);
             }
         }
         if y < 0.0 {
@@ -126,19 +127,11 @@ impl Pyramid {
             let s3 = mean - delta * self.edge_23.g[2];
             let gap = self.gap_above(s3);
             if gap >= 0.0 {
-                return Returned {
-                    zone: Zone::Edge23,
-                    stress: Vector3::new(self.s1_above(s3), s3, s3),
-                    gaps: [gap, 0.0],
-                };
+                return Returned::to(Zone::Edge23, [self.s1_above(s3), s3, s3], [gap, 0.0]);
             }
         }
         // Eq. (7). For φ = 0 the gap is 2c and the apex is never reached.
-        Returned {
-            zone: Zone::Apex,
-            stress: Vector3::from_element(self.apex),
-            gaps: [0.0, 0.0],
-        }
+        Returned::to(Zone::Apex, [self.apex; 3], [0.0, 0.0])
     }
 
     /// Tension plane, edge and corner, Eq. (8), for s₁\* above the tensile strength.
@@ -160,11 +153,7 @@ impl Pyramid {
         } else {
             (Zone::TensionCorner, R_t)
         };
-        Returned {
-            zone,
-            stress: Vector3::new(R_t, R_t, s3),
-            gaps: [0.0, R_t - s3],
-        }
+        Returned::to(zone, [R_t, R_t, s3], [0.0, R_t - s3])
     }
 
     /// Where the pyramid meets the cut-off, Eq. (9).
@@ -179,10 +168,6 @@ impl Pyramid {
         } else {
             (Zone::FaceAndTension, s2)
         };
-        Returned {
-            zone,
-            stress: Vector3::new(s1, s2, s3),
-            gaps: [s1 - s2, s2 - s3],
-        }
+        Returned::to(zone, [s1, s2, s3], [s1 - s2, s2 - s3])
     }
 }

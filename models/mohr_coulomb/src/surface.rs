@@ -84,14 +84,39 @@ pub(crate) fn apex(cohesion: f64, friction_angle: f64) -> f64 {
     }
 }
 
+/// Eq. (12), by zone: the elastic operator, averaged over the merged pair, less what flow takes away.
+fn consistent_moduli(
+    elasticity: &Elasticity,
+    phi: &Slope,
+    [face, edge_12, edge_23]: [&Direction; 3],
+) -> [Matrix3<f64>; 10] {
+    let Elasticity {
+        E, nu, lambda, G, ..
+    } = *elasticity;
+    let D = elasticity.principal_operator();
+    let P_12 = Matrix3::new(0.5, 0.5, 0.0, 0.5, 0.5, 0.0, 0.0, 0.0, 1.0);
+    let P_23 = Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.5, 0.5, 0.0, 0.5, 0.5);
+    let less = |D: Matrix3<f64>, to: &Direction, weight| {
+        D - to.g * phi.g(lambda / G, weight).transpose() * (G / to.h)
+    };
+    let plane_stress = E / ((1.0 - nu) * (1.0 + nu));
+    let mut M = [Matrix3::zeros(); 10];
+    M[Zone::Face as usize] = less(D, face, FACE);
+    M[Zone::Edge12 as usize] = less(P_12 * D, edge_12, EDGE_12);
+    M[Zone::Edge23 as usize] = less(P_23 * D, edge_23, EDGE_23);
+    M[Zone::TensionPlane as usize] =
+        Matrix3::new(0.0, 0.0, 0.0, 0.0, 1.0, nu, 0.0, nu, 1.0) * plane_stress;
+    M[Zone::TensionEdge as usize][(2, 2)] = E;
+    M[Zone::FaceAndTension as usize][(1, 1)] = E;
+    M
+}
+
 impl Pyramid {
     /// The surface of this strength.
     pub(crate) fn new(elasticity: &Elasticity, strength: &Strength) -> Self {
         let phi = Slope::new(strength.friction_angle);
         let psi = Slope::new(strength.dilatancy_angle);
-        let Elasticity {
-            E, nu, lambda, G, ..
-        } = *elasticity;
+        let Elasticity { nu, lambda, G, .. } = *elasticity;
         let r = lambda / G;
         let ss = r * phi.sin * psi.sin;
         let (aa, bb) = (phi.a * psi.a, phi.b * psi.b);
@@ -104,23 +129,7 @@ impl Pyramid {
         let edge_12 = direction(EDGE_12, ss + aa + 2.0 * bb);
         let edge_23 = direction(EDGE_23, ss + 2.0 * aa + bb);
 
-        // Eq. (12): the elastic operator, averaged over the merged pair, less what flow takes away.
-        let D = elasticity.principal_operator();
-        let P_12 = Matrix3::new(0.5, 0.5, 0.0, 0.5, 0.5, 0.0, 0.0, 0.0, 1.0);
-        let P_23 = Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.5, 0.5, 0.0, 0.5, 0.5);
-        let less = |D: Matrix3<f64>, to: &Direction, weight| {
-            D - to.g * phi.g(r, weight).transpose() * (G / to.h)
-        };
-        let plane_stress = E / ((1.0 - nu) * (1.0 + nu));
-        let mut M = [Matrix3::zeros(); 10];
-        M[Zone::Face as usize] = less(D, &face, FACE);
-        M[Zone::Edge12 as usize] = less(P_12 * D, &edge_12, EDGE_12);
-        M[Zone::Edge23 as usize] = less(P_23 * D, &edge_23, EDGE_23);
-        M[Zone::TensionPlane as usize] =
-            Matrix3::new(0.0, 0.0, 0.0, 0.0, 1.0, nu, 0.0, nu, 1.0) * plane_stress;
-        M[Zone::TensionEdge as usize][(2, 2)] = E;
-        M[Zone::FaceAndTension as usize][(1, 1)] = E;
-
+        let M = consistent_moduli(elasticity, &phi, [&face, &edge_12, &edge_23]);
         let c_cos_phi = strength.cohesion * phi.cos;
         Self {
             phi,
