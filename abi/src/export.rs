@@ -171,11 +171,26 @@ struct Boxed<L> {
     law: L,
     n_components: usize,
     n_states: usize,
-    n_parameters: usize,
     /// `PILUM_T_*` flags of the formulation.
     flags: u32,
     /// A panic was caught: the law is defective and is not called again.
     poisoned: AtomicBool,
+}
+
+/// A law with these parameters.
+///
+/// # Errors
+/// Why there is none, and as what status.
+fn built<L: Exported>(values: &[f64]) -> Result<L, (Status, String)> {
+    if let Err((id, value)) = within_bounds(<L::Parameters as Parameters>::TABLE, values) {
+        let why = format!("{id}: {value} is not admissible");
+        return Err((raw::PILUM_E_PARAMETER, why));
+    }
+    let law = catch_unwind(|| L::new(L::Parameters::read(values))).map_err(|payload| {
+        let why = format!("panicked in `new`: {}", panic_text(&*payload));
+        (raw::PILUM_E_INTERNAL, why)
+    })?;
+    law.map_err(|reason| (raw::PILUM_E_PARAMETER, reason))
 }
 
 unsafe extern "C" fn create<L: Exported>(
@@ -183,46 +198,38 @@ unsafe extern "C" fn create<L: Exported>(
     _: *const Host,
     formulation: u32,
     parameter: *const f64,
-    n_parameters: u32,
+    given: u32,
     out: *mut *mut Instance,
     message: *mut c_char,
     message_capacity: usize,
 ) -> Status {
     // SAFETY: contract of `create`: null, or `message_capacity` bytes.
     let mut message = unsafe { Message::new(message, message_capacity) };
-    let table = <L::Parameters as Parameters>::TABLE;
+    let n = <L::Parameters as Parameters>::TABLE.len();
     let Some(formulation) = L::FORMULATIONS.get(formulation as usize) else {
         message.write(format_args!("there is no formulation number {formulation}"));
         return raw::PILUM_E_ARGUMENT;
     };
-    if n_parameters as usize != table.len() || out.is_null() {
-        message.write(format_args!(
-            "{n_parameters} parameters given, {} expected",
-            table.len()
-        ));
+    if given as usize != n || out.is_null() {
+        message.write(format_args!("{given} parameters given, {n} expected"));
         return raw::PILUM_E_ARGUMENT;
     }
-    let values: &[f64] = if table.is_empty() {
+    let values: &[f64] = if n == 0 {
         &[]
     } else if parameter.is_null() {
         message.write(format_args!("the parameters are null"));
         return raw::PILUM_E_ARGUMENT;
     } else {
-        // SAFETY: contract of `create`: `parameter` holds `n_parameters` values.
-        unsafe { std::slice::from_raw_parts(parameter, table.len()) }
+        // SAFETY: contract of `create`: `parameter` holds so many values.
+        unsafe { std::slice::from_raw_parts(parameter, n) }
     };
-    if let Err((id, value)) = within_bounds(table, values) {
-        message.write(format_args!("{id}: {value} is not admissible"));
-        return raw::PILUM_E_PARAMETER;
-    }
-    match catch_unwind(|| L::new(L::Parameters::read(values))) {
-        Ok(Ok(law)) => {
+    match built::<L>(values) {
+        Ok(law) => {
+            let hypothesis = Hypothesis::from_code(formulation.hypothesis);
             let boxed = Boxed {
                 law,
-                n_components: Hypothesis::from_code(formulation.hypothesis)
-                    .map_or(0, Hypothesis::n_components),
+                n_components: hypothesis.map_or(0, Hypothesis::n_components),
                 n_states: formulation.n_states as usize,
-                n_parameters: table.len(),
                 flags: formulation.flags,
                 poisoned: AtomicBool::new(false),
             };
@@ -230,13 +237,9 @@ unsafe extern "C" fn create<L: Exported>(
             unsafe { out.write(Box::into_raw(Box::new(boxed)).cast()) };
             raw::PILUM_OK
         }
-        Ok(Err(reason)) => {
-            message.write(format_args!("{reason}"));
-            raw::PILUM_E_PARAMETER
-        }
-        Err(payload) => {
-            message.write(format_args!("panicked in `new`: {}", panic_text(&*payload)));
-            raw::PILUM_E_INTERNAL
+        Err((status, why)) => {
+            message.write(format_args!("{why}"));
+            status
         }
     }
 }
@@ -334,10 +337,11 @@ unsafe fn run<L: Exported>(instance: *const Instance, batch: *const Batch, work:
         message.write(format_args!("{why}"));
         return status;
     }
+    let n_parameters = <L::Parameters as Parameters>::TABLE.len();
     // SAFETY: contract of `Rates::parameter`: null, or as many values as parameters are declared.
     let rates = rates
         .as_ref()
-        .map(|rates| unsafe { Directions::new(rates, boxed.n_parameters) });
+        .map(|rates| unsafe { Directions::new(rates, n_parameters) });
     let rates = rates.as_ref();
     if boxed.poisoned.load(Ordering::Relaxed) {
         message.write(format_args!(
@@ -345,18 +349,13 @@ unsafe fn run<L: Exported>(instance: *const Instance, batch: *const Batch, work:
         ));
         return raw::PILUM_E_INTERNAL;
     }
+    let n = boxed.n_components;
     if is_packed(&batch) {
-        run_points(
-            boxed,
-            &Access::<true>::new(&batch, boxed.n_components),
-            rates,
-            work,
-            message,
-        )
+        run_points(boxed, &Access::<true>::new(&batch, n), rates, work, message)
     } else {
         run_points(
             boxed,
-            &Access::<false>::new(&batch, boxed.n_components),
+            &Access::<false>::new(&batch, n),
             rates,
             work,
             message,
@@ -373,6 +372,7 @@ fn run_points<L: Exported, const PACKED: bool>(
     mut message: Message,
 ) -> Status {
     let batch = access.batch;
+    let number = |i: usize| batch.first_point.wrapping_add(i as u64);
     let current = Cell::new(0);
     let result = catch_unwind(AssertUnwindSafe(|| {
         let mut worst = raw::PILUM_OK;
@@ -396,21 +396,15 @@ fn run_points<L: Exported, const PACKED: bool>(
             access.put_step_factor(i, outcome.err());
             if most_severe(worst, status) != worst {
                 worst = status;
-                message.write(format_args!(
-                    "point {}: {reason}",
-                    batch.first_point.wrapping_add(i as u64)
-                ));
+                message.write(format_args!("point {}: {reason}", number(i)));
             }
         }
         worst
     }));
     result.unwrap_or_else(|payload| {
         boxed.poisoned.store(true, Ordering::Relaxed);
-        let point = batch.first_point.wrapping_add(current.get() as u64);
-        message.write(format_args!(
-            "point {point}: panicked: {}",
-            panic_text(&*payload)
-        ));
+        let (point, text) = (number(current.get()), panic_text(&*payload));
+        message.write(format_args!("point {point}: panicked: {text}"));
         for i in current.get()..batch.n_points as usize {
             access.put_status(i, raw::PILUM_E_INTERNAL);
         }

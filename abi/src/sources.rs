@@ -29,13 +29,15 @@ pub const MODULE: File = file!("include/pilum_law.f90");
 pub const EXPORTS: File = file!("include/exports.map");
 
 /// This crate without its optional features, but for its manifest.
-pub const CRATE: [File; 15] = [
+pub const CRATE: [File; 17] = [
     file!("README.md"),
     file!("src/lib.rs"),
     file!("src/access.rs"),
     file!("src/descriptor.rs"),
+    file!("src/descriptor/formulation.rs"),
     file!("src/differences.rs"),
     file!("src/dual.rs"),
+    file!("src/dual/by_duals.rs"),
     file!("src/export.rs"),
     file!("src/export/adapter.rs"),
     file!("src/friction.rs"),

@@ -155,62 +155,40 @@ impl fmt::Display for Mismatch {
 /// earlier ones agree.
 pub fn check(theirs: &MagicBlock) -> Result<(), Mismatch> {
     let ours = &MAGIC_BLOCK;
-    let differs = |field, expected: u64, found: u64, hint| {
-        Err(Mismatch {
-            field,
-            expected,
-            found,
-            hint,
-        })
-    };
-    if theirs.magic != ours.magic {
-        let hint = if theirs.magic == ours.magic.swap_bytes() {
+    macro_rules! same {
+        ($field:ident, $hint:expr) => {
+            if theirs.$field != ours.$field {
+                return Err(Mismatch {
+                    field: stringify!($field),
+                    expected: ours.$field.into(),
+                    found: theirs.$field.into(),
+                    hint: $hint,
+                });
+            }
+        };
+    }
+    let is_swapped = theirs.magic == ours.magic.swap_bytes();
+    same!(
+        magic,
+        if is_swapped {
             "the library is for the other endianness"
         } else {
             "this is no Pilum law library"
-        };
-        return differs("magic", ours.magic.into(), theirs.magic.into(), hint);
-    }
-    if theirs.struct_size < ours.struct_size {
-        return differs(
-            "struct_size",
-            ours.struct_size.into(),
-            theirs.struct_size.into(),
-            "the handshake block is truncated",
-        );
-    }
-    for (field, expected, found, hint) in [
-        (
-            "pointer_bytes",
-            ours.pointer_bytes,
-            theirs.pointer_bytes,
-            "another pointer width",
-        ),
-        (
-            "real_bytes",
-            ours.real_bytes,
-            theirs.real_bytes,
-            "reals must be doubles",
-        ),
-    ] {
-        if expected != found {
-            return differs(field, expected.into(), found.into(), hint);
         }
+    );
+    if theirs.struct_size < ours.struct_size {
+        same!(struct_size, "the handshake block is truncated");
     }
-    if theirs.abi_major != ours.abi_major {
-        return differs(
-            "abi_major",
-            ours.abi_major.into(),
-            theirs.abi_major.into(),
-            "rebuild the library against this version of the contract",
-        );
-    }
-    if theirs.abi_minor == ours.abi_minor && theirs.layout_hash != ours.layout_hash {
-        return differs(
-            "layout_hash",
-            ours.layout_hash,
-            theirs.layout_hash,
-            "compiler flags or an edited header changed the structs",
+    same!(pointer_bytes, "another pointer width");
+    same!(real_bytes, "reals must be doubles");
+    same!(
+        abi_major,
+        "rebuild the library against this version of the contract"
+    );
+    if theirs.abi_minor == ours.abi_minor {
+        same!(
+            layout_hash,
+            "compiler flags or an edited header changed the structs"
         );
     }
     Ok(())

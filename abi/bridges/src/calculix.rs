@@ -7,7 +7,7 @@
 //! interface to Abaqus' routines makes it. That slows the iteration of laws with non-associated
 //! flow and does not change the stress.
 
-use crate::laws::{Laws, Trouble, complain, offers};
+use crate::laws::{Laws, offers, refused};
 use crate::point::{Answer, Carried, Point};
 use crate::umat::{or, row};
 use abi::export::Continuum;
@@ -76,55 +76,20 @@ pub unsafe fn answer<L: ContinuumLaw>(laws: &Laws<Continuum<L>>, call: &Call) {
 /// `icmd` of a call that wants no stiffness.
 const ONLY_STRESS: c_int = 3;
 
+/// The point that a call is about.
+///
 /// # Safety
-/// As [`answer`].
-unsafe fn carried<L: ContinuumLaw>(
-    laws: &Laws<Continuum<L>>,
-    call: &Call,
-) -> Result<Answer<6>, f64> {
-    let id = L::DESCRIPTION.id;
-    if !offers::<Continuum<L>>(Hypothesis::ThreeD) {
-        complain(
-            id,
-            format_args!("CalculiX needs three dimensions, which it does not offer"),
-        );
-        return Err(0.25);
-    }
-    let n_states = <L::State as InternalVariables>::TABLE.len();
-    // SAFETY: null or valid, as `CalculiX`' interface says; so are those below.
-    let (n_state, iorien, icmd, ielas) = unsafe {
-        (
-            or(call.nstate, 0),
-            or(call.iorien, 0),
-            or(call.icmd, 0),
-            or(call.ielas, 0),
-        )
-    };
-    if iorien != 0 {
-        complain(id, format_args!("it takes no *ORIENTATION by this entry"));
-        return Err(0.25);
-    }
-    if (n_state.max(0) as usize) < n_states {
-        complain(
-            id,
-            format_args!("*DEPVAR {n_state}, the law has {n_states} internal variables"),
-        );
-        return Err(0.25);
-    }
-    // SAFETY: there are −kode − 100 constants, and one block of `nstate` variables for each of the
-    // `mi(1)` points of each element; elements and points count from 1.
-    let (given, point) = unsafe {
-        let given = match -or(call.kode, -100) - 100 {
-            n if n > 0 => std::slice::from_raw_parts(call.elconloc, n as usize),
-            _ => &[],
-        };
-        let block = (or(call.iint, 1) - 1) as isize
-            + or(call.mi, 1) as isize * (or(call.iel, 1) - 1) as isize;
-        let place = n_state as isize * block;
+/// As [`answer`]; `nstate` is its value.
+unsafe fn point(call: &Call, nstate: c_int) -> Point<6> {
+    // SAFETY: see above.
+    unsafe {
+        let (element, point) = (or(call.iel, 1) - 1, or(call.iint, 1) - 1);
+        let block = point as isize + or(call.mi, 1) as isize * element as isize;
+        let place = nstate as isize * block;
         let (begin, end) = (row::<6>(call.emec0), row::<6>(call.emec));
         let gamma = |i: usize, value: f64| if i < 3 { value } else { 2.0 * value };
         let dtime = or(call.dtime, 0.0);
-        let point = Point {
+        Point {
             gradient: std::array::from_fn(|i| gamma(i, begin[i])),
             increment: std::array::from_fn(|i| gamma(i, end[i] - begin[i])),
             flux: row(call.stre),
@@ -133,19 +98,49 @@ unsafe fn carried<L: ContinuumLaw>(
             time: or(call.ttime, 0.0) + or(call.time, 0.0) - dtime,
             time_increment: dtime,
             step_time: or(call.time, 0.0) - dtime,
+        }
+    }
+}
+
+/// # Safety
+/// As [`answer`].
+unsafe fn carried<L: ContinuumLaw>(
+    laws: &Laws<Continuum<L>>,
+    call: &Call,
+) -> Result<Answer<6>, f64> {
+    let id = L::DESCRIPTION.id;
+    if !offers::<Continuum<L>>(Hypothesis::ThreeD) {
+        return refused(
+            id,
+            format_args!("CalculiX needs three dimensions, which it does not offer"),
+        );
+    }
+    let n_states = <L::State as InternalVariables>::TABLE.len();
+    // SAFETY: null or valid, as `CalculiX`' interface says; so are those below.
+    let (n_state, iorien) = unsafe { (or(call.nstate, 0), or(call.iorien, 0)) };
+    if iorien != 0 {
+        return refused(id, format_args!("it takes no *ORIENTATION by this entry"));
+    }
+    if (n_state.max(0) as usize) < n_states {
+        return refused(
+            id,
+            format_args!("*DEPVAR {n_state}, the law has {n_states} internal variables"),
+        );
+    }
+    // SAFETY: there are −kode − 100 constants, and one block of `nstate` variables for each of the
+    // `mi(1)` points of each element; elements and points count from 1.
+    let (given, point) = unsafe {
+        let given = match -or(call.kode, -100) - 100 {
+            n if n > 0 => std::slice::from_raw_parts(call.elconloc, n as usize),
+            _ => &[],
         };
-        (given, point)
+        (given, point(call, n_state))
     };
-    let tangent = match (icmd, ielas) {
+    // SAFETY: as above.
+    let tangent = match unsafe { (or(call.icmd, 0), or(call.ielas, 0)) } {
         (ONLY_STRESS, _) => Tangent::None,
         (_, 1) => Tangent::Elastic,
         _ => Tangent::Consistent,
     };
-    let mut factor = 0.25;
-    let tell = |trouble: Trouble<'_>| {
-        factor = trouble.factor();
-        complain(id, format_args!("{trouble}"));
-    };
-    laws.carry(given, |law| law.carry(&point, tangent), tell)
-        .ok_or(factor)
+    laws.carry_or_complain(id, given, |law| law.carry(&point, tangent))
 }

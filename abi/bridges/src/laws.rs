@@ -195,6 +195,25 @@ impl<L: Exported> Laws<L> {
         built.carry(work).map_err(tell).ok()
     }
 
+    /// The same for a program that takes no messages.
+    ///
+    /// # Errors
+    /// The factor of a step that may succeed; the reason is reported.
+    #[inline]
+    pub(crate) fn carry_or_complain<A>(
+        &self,
+        id: &CStr,
+        given: &[f64],
+        work: impl FnOnce(&L) -> Result<A, Failure>,
+    ) -> Result<A, f64> {
+        let mut factor = STEP_FACTOR;
+        let tell = |trouble: Trouble<'_>| {
+            factor = trouble.factor();
+            complain(id, format_args!("{trouble}"));
+        };
+        self.carry(given, work, tell).ok_or(factor)
+    }
+
     /// Builds a law and puts it at the head of the list, unless there are too many. Two threads may keep
     /// the same one twice.
     #[cold]
@@ -255,6 +274,18 @@ fn find<'a, L>(mut at: *const Kept<L>, given: &[f64]) -> Option<&'a Built<L>> {
         at = kept.next;
     }
     None
+}
+
+/// The step factor where a call cannot be answered as it is.
+const STEP_FACTOR: f64 = 0.25;
+
+/// Says why a call cannot be answered as it is.
+///
+/// # Errors
+/// Its step factor.
+pub(crate) fn refused<T>(law: &CStr, text: fmt::Arguments<'_>) -> Result<T, f64> {
+    complain(law, text);
+    Err(STEP_FACTOR)
 }
 
 /// Says something on the standard error stream, the only channel of a program that takes no

@@ -11,7 +11,7 @@
 //! fraction of the increment that the law believes it can follow. A caller that ignores `PNEWDT`, or
 //! passes null, must not take the stress at the start for that at the end.
 
-use crate::laws::{Laws, Trouble, complain, offers};
+use crate::laws::{Laws, complain, offers, refused};
 use crate::point::{Answer, Carried, Point};
 use abi::export::{Continuum, Exported};
 use abi::{ContinuumLaw, Hypothesis, InternalVariables, Tangent};
@@ -209,10 +209,7 @@ pub unsafe fn answer<L: ContinuumLaw>(laws: &Laws<Continuum<L>>, call: &Call) {
         None if n == 6 => unsafe { carry::<L, 6>(laws, call) },
         // SAFETY: as above.
         None => unsafe { carry::<L, 4>(laws, call) },
-        Some(why) => {
-            complain(id, format_args!("NTENS = {ntens} with NDI = {ndi}: {why}"));
-            Err(0.25)
-        }
+        Some(why) => refused(id, format_args!("NTENS = {ntens} with NDI = {ndi}: {why}")),
     };
     let Err(factor) = done else {
         return;
@@ -261,11 +258,10 @@ unsafe fn carry<L: ContinuumLaw, const N: usize>(
         (or(call.nstatv, all as c_int), or(call.nprops, 0))
     };
     if needed > 0 && (call.statev.is_null() || (n_statev.max(0) as usize) < needed) {
-        complain(
+        return refused(
             id,
             format_args!("NSTATV = {n_statev}, the law has {needed} internal variables"),
         );
-        return Err(0.25);
     }
     let given: &[f64] = if call.props.is_null() || n_props <= 0 {
         &[]
@@ -295,13 +291,7 @@ unsafe fn carry<L: ContinuumLaw, const N: usize>(
     } else {
         Tangent::Consistent
     };
-    let mut factor = 0.25;
-    let tell = |trouble: Trouble<'_>| {
-        factor = trouble.factor();
-        complain(id, format_args!("{trouble}"));
-    };
-    let answer = laws.carry(given, |law| law.carry(&point, tangent), tell);
-    let answer = answer.ok_or(factor)?;
+    let answer = laws.carry_or_complain(id, given, |law| law.carry(&point, tangent))?;
     // SAFETY: as in `answer`.
     unsafe { put(call, &answer) };
     Ok(())

@@ -254,6 +254,20 @@ unsafe fn give_up(data: &Data, factor: f64) -> c_int {
     -1
 }
 
+/// The axes of the layer, of a law that has such.
+///
+/// # Safety
+/// The properties of such a law are not null.
+#[inline]
+unsafe fn axes<L: Exported>(data: &Data) -> Axes {
+    if has_axes::<L>() {
+        // SAFETY: see above.
+        Axes::at(unsafe { angle::<L>(data) })
+    } else {
+        Axes(None)
+    }
+}
+
 /// The reason why the results are inaccurate, if they are.
 ///
 /// # Errors
@@ -267,30 +281,21 @@ unsafe fn carry<L: Carried<N>, const N: usize>(
     data: &Data,
     start: Start<N>,
 ) -> Result<Option<&'static str>, Failure> {
-    let (s0, s1) = (&data.s0, &data.s1);
-    let axes = if has_axes::<L>() {
-        // SAFETY: the law is in axes of its layer, the properties are not null.
-        Axes::at(unsafe { angle::<L>(data) })
-    } else {
-        Axes(None)
-    };
-    let Start {
-        request,
-        begin,
-        end,
-        forces,
-    } = start;
+    // SAFETY: as for this function.
+    let axes = unsafe { axes::<L>(data) };
+    let request = start.request;
+    let d_gradient = std::array::from_fn(|i| start.end[i] - start.begin[i]);
     let mut unused;
     let point = Point {
-        gradient: axes.strain(gradient(begin)),
-        increment: axes.strain(gradient(std::array::from_fn(|i| end[i] - begin[i]))),
-        flux: axes.stress(flux(forces)),
-        state0: s0.internal_state_variables,
+        gradient: axes.strain(gradient(start.begin)),
+        increment: axes.strain(gradient(d_gradient)),
+        flux: axes.stress(flux(start.forces)),
+        state0: data.s0.internal_state_variables,
         state1: if request.prediction {
             unused = [0.0; MOST_STATES];
             unused.as_mut_ptr()
         } else {
-            s1.internal_state_variables
+            data.s1.internal_state_variables
         },
         time: 0.0,
         time_increment: data.dt,
@@ -303,18 +308,15 @@ unsafe fn carry<L: Carried<N>, const N: usize>(
         Tangent::Consistent => law.carry(&point, Tangent::Consistent),
     }?;
     if !request.prediction {
-        let flux = axes.back(answer.flux);
-        for (i, value) in flux.into_iter().enumerate() {
+        for (i, value) in axes.back(answer.flux).into_iter().enumerate() {
             // SAFETY: `N` components.
-            unsafe { *s1.thermodynamic_forces.add(i) = value / scale(i) };
+            unsafe { *data.s1.thermodynamic_forces.add(i) = value / scale(i) };
         }
     }
     if request.tangent != Tangent::None {
-        let operator = if rests_on_its_surface::<L, N>(&point, request.tangent) {
-            loading(law, point).map_or(answer.operator, |answer| answer.operator)
-        } else {
-            answer.operator
-        };
+        let rests = rests_on_its_surface::<L, N>(&point, request.tangent);
+        let loaded = rests.then(|| loading(law, point)).flatten();
+        let operator = loaded.map_or(answer.operator, |loaded| loaded.operator);
         for (i, row) in axes.operator_back(&operator).iter().enumerate() {
             for (j, value) in row.iter().enumerate() {
                 // SAFETY: where an operator is requested, `K` has `N` × `N` components.
