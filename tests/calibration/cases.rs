@@ -103,3 +103,24 @@ fn the_shaft_of_a_pile_from_its_load_test() {
     let sand = &block["laws"]["skin_sand"]["parameters"];
     assert!((sand["friction_angle"].as_float().unwrap() - 27.0).abs() < 0.5);
 }
+
+/// Measured: the friction is that of the mean stresses, the contraction what the normal stress loses to the spring.
+#[test]
+fn friction_and_contraction_of_a_measured_interface() {
+    let outcome = run(&case("measured_interface_praai/calibration.toml"), &[]).unwrap();
+    let file = case("measured_interface_praai/final_shear.csv");
+    let [slip, tau, sigma] = ["slip (mm)", "shear stress (kPa)", "normal stress (kPa)"]
+        .map(|name| tests::case::column(&file, name));
+    let sum = |values: &[f64]| values.iter().sum::<f64>();
+    let friction = (sum(&tau) / sum(&sigma)).atan().to_degrees();
+    let found = outcome.values[number(&outcome, "residual_friction_angle")];
+    assert!((found - friction).abs() < 1.0, "{found}, {friction}");
+    // Means of ten points at either end, as the plot scatters; 1000 kPa/mm.
+    let ends = |values: &[f64]| sum(&values[..10]) - sum(&values[values.len() - 10..]);
+    let contraction = (ends(&sigma) / -ends(&slip) / 1000.0).atan().to_degrees();
+    let found = outcome.values[number(&outcome, "contraction_angle")];
+    assert!(
+        (found / contraction - 1.0).abs() < 0.1,
+        "{found}, {contraction}"
+    );
+}

@@ -13,6 +13,7 @@ mod chamber_mesh;
 mod chamber_soil_law;
 mod ground;
 mod joint_laws;
+mod piles;
 mod shear_box;
 mod shear_zone;
 mod variant;
