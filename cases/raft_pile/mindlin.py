@@ -74,4 +74,5 @@ def main(rafts=20, shafts=40, bases=4):
         print(name, round(sum(loads[i] for i in range(n) if parts[i][0] == name), 1))
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -178,3 +178,19 @@ fn friction_reverses_and_a_gap_below_the_base_opens_and_closes() {
     let back = again[2][24] / run.end("pushed", "pile_base_load");
     assert!((0.85..1.0).contains(&back), "{back} of its first load");
 }
+
+/// Restrained in closed form; in the ground by `mindlin.py`, without slip at the shaft's ends.
+#[test]
+fn a_heated_pile_presses_and_rises() {
+    let free_strain = 2e-4;
+    let restrained = finished("energy_pile/restrained.toml", "");
+    let all = 30e6 * PI * 0.09 * free_strain;
+    assert_close(restrained.end("heated", "axial_force"), all, 1e-6, "N");
+    let free = finished("energy_pile", "head_free");
+    assert!(free.end("heated", "pile_head_load").abs() < 1e-6);
+    let rise = -free.end("heated", "pile_settlement");
+    assert_close(rise, 1.504e-3, 0.05, "rise of the head");
+    let held = finished("energy_pile", "head_held");
+    let head = held.end("heated", "pile_head_load");
+    assert_close(head, 557.0, 0.15, "head that is held");
+}
