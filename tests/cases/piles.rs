@@ -82,17 +82,19 @@ fn a_cyclic_joint_follows_measured_shear_once_it_is_fitted() {
     );
 }
 
-/// Friction by the β method from the head to a depth, kN: K_0 = 0.5, δ = 25°, 30 kPa of fill, γ' = 8 kN/m³.
+/// Friction by the β method from the head to a depth, kN: `K_0` = 0.5, δ = 25°, 30 kPa of fill, γ' = 8 kN/m³.
 fn drag(depth: f64) -> f64 {
     let beta = 0.5 * 25_f64.to_radians().tan();
     PI * 0.5 * beta * (30.0 * depth + 4.0 * depth * depth)
 }
 
-/// Friction turns round within 2 m, so less than by hand is mobilised.
+/// Dead load and weight of the pile in settling clay, kN.
+const CARRIED: f64 = 200.0 + 17.81 * 15.0 * PI / 16.0;
+
+/// On rock: the joint does not slide over the last 2 m, so less than by hand is mobilised.
 #[test]
 fn settling_clay_drags_a_pile_down() {
     let phase = "consolidation";
-    let weight = 17.81 * 15.0 * PI / 16.0;
     // Oedometric modulus at E = 3 MPa and ν = 1/3: 4.5 MPa; 20 and 15 m of clay.
     for (variant, clay) in [("floating", 20.0), ("on_rock", 15.0)] {
         let run = finished("settling_clay_pile", variant);
@@ -101,16 +103,22 @@ fn settling_clay_drags_a_pile_down() {
         assert!(run.end(phase, "excess").abs() < 1e-6);
     }
     let rock = finished("settling_clay_pile", "on_rock");
-    let dragload = rock.end(phase, "pile_base_load") - 200.0 - weight;
+    let dragload = rock.end(phase, "pile_base_load") - CARRIED;
     let share = dragload / drag(15.0);
     assert!(
         (0.85..1.0).contains(&share),
         "{share} of the hand calculation"
     );
+}
+
+/// Friction turns round within 2 m, so less than by hand is mobilised.
+#[test]
+fn a_neutral_plane_is_where_a_hand_calculation_has_it() {
+    let phase = "consolidation";
     let floating = finished("settling_clay_pile", "floating");
     // F(z_n) = (F(15) + Q_b − P − W)/2, with Q_b of the run.
     let base = floating.end(phase, "pile_base_load");
-    let by_hand = 0.5 * (drag(15.0) + base - 200.0 - weight);
+    let by_hand = 0.5 * (drag(15.0) + base - CARRIED);
     let neutral = -floating.end(phase, "pile_neutral_plane");
     assert_close(drag(neutral), by_hand, 0.06, "neutral plane");
     let dragload = floating.end(phase, "pile_dragload");
@@ -191,6 +199,6 @@ fn a_heated_pile_presses_and_rises() {
     let rise = -free.end("heated", "pile_settlement");
     assert_close(rise, 1.504e-3, 0.05, "rise of the head");
     let held = finished("energy_pile", "head_held");
-    let head = held.end("heated", "pile_head_load");
-    assert_close(head, 557.0, 0.15, "head that is held");
+    let load = held.end("heated", "pile_head_load");
+    assert_close(load, 557.0, 0.15, "head that is held");
 }
