@@ -132,6 +132,7 @@ pub(crate) enum Command {
 
 /// Arguments of `pilum run`.
 #[derive(Args)]
+#[expect(clippy::struct_field_names, reason = "options of the command line")]
 pub(crate) struct Run {
     /// A case file, or a folder with `case.toml`.
     pub(crate) case: PathBuf,

@@ -94,7 +94,7 @@ fn study_settings(asked: TradeOff, opener: Opener) -> Result<(), Error> {
     printing(|out| {
         let mut show = |text: &str| out.line(text);
         trade_off::run(&asked.input, &options, &mut show, &mut |doing| {
-            say!("{doing}")
+            say!("{doing}");
         })
     })
 }
@@ -113,7 +113,7 @@ fn calibrate(asked: Calibrate, opener: Opener) -> Result<(), Error> {
     printing(|out| {
         let mut show = |text: &str| out.line(text);
         calibration::run(&asked.file, &options, &mut show, &mut |doing| {
-            say!("{doing}")
+            say!("{doing}");
         })
     })
 }

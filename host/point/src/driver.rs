@@ -162,6 +162,7 @@ impl Driver {
         let notes = self.notes.iter().cloned();
         let mut warnings: Vec<Warning> = notes.map(Warning::Note).collect();
         let dependence = self.law.time_dependence();
+        let depends_on_time = dependence.is_some();
         let says_none = |segment: &Segment| segment.time.is_none();
         let first = self.segments.iter().position(says_none);
         if let (Some(number), Some(by)) = (first, dependence) {
@@ -183,7 +184,7 @@ impl Driver {
             return Err(self.refused(refusal.map(|refusal| refusal.message).unwrap_or_default()));
         };
         // What a law does in the time of this call is what it is for.
-        if dependence.is_none() {
+        if !depends_on_time {
             warnings.extend(self.moved(&returned));
         }
         Ok((point, search, warnings))

@@ -275,7 +275,8 @@ impl<'a> Walk<'a> {
         if miss.is_none() {
             return Ok(());
         }
-        let obstacle = self.search.take_obstacle();
-        Err(Self::shortfall(1.0, to, Obstacle { miss, ..obstacle }))
+        let mut obstacle = self.search.take_obstacle();
+        obstacle.miss = miss;
+        Err(Self::shortfall(1.0, to, obstacle))
     }
 }

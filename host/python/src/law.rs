@@ -5,7 +5,7 @@ pub(crate) mod found;
 
 use crate::arrays::{Rows, looked_at};
 use crate::error::{InputError, exception, of_batch};
-use crate::state::{Memory, State};
+use crate::state::State;
 use crate::{task, value};
 use abi::Hypothesis;
 use batch::{has_room, repeated};

@@ -14,7 +14,7 @@ use runs::run::Observer;
 use runs::study::{Event, Jobs, Once, Plan, carry_out, run_one, stop_of_worker};
 use std::collections::BTreeMap;
 use std::io::IsTerminal as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 pub(super) fn study(asked: &Study, opener: &Opener) -> Result<(), Error> {

@@ -18,7 +18,6 @@ use abi::{
 };
 use elasticity::Elasticity;
 use nalgebra::Vector3;
-use return_mapping::Returned;
 use spectral::{MohrCircle, Pair, Spatial};
 use std::array;
 use surface::Pyramid;

@@ -212,7 +212,7 @@ fn fault(
     first: &[PointEnd],
     ids: &[&str],
     [points, before]: [&[PointStart]; 2],
-    call: impl Fn(&[PointStart]) -> Result<Vec<PointEnd>, Error>,
+    mut call: impl FnMut(&[PointStart]) -> Result<Vec<PointEnd>, Error>,
 ) -> Result<Option<String>, Error> {
     let unwritten = first.iter().enumerate().find_map(|(i, end)| {
         let k = end.state.iter().position(|value| !value.is_finite())?;

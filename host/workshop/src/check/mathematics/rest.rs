@@ -6,6 +6,7 @@ use crate::check::points::{
     ELASTIC, ITERATED, UPDATE, apart, at_rest, first_difference, increment, is_finite, is_success,
     largest,
 };
+use crate::check::random::Random;
 use crate::check::specimen::{INSTANT, Specimen};
 use crate::check::{Found, Subject, Verdict, counted, refusal, status_name};
 use abi::raw;

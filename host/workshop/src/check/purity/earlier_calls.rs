@@ -3,10 +3,10 @@
 use super::{Called, compare};
 use crate::check::points::{ELASTIC, UPDATE, first_difference};
 use crate::check::random::Random;
-use crate::check::specimen::{BOTH, asked, name};
+use crate::check::specimen::{BOTH, Specimen, asked, name};
 use crate::check::{Found, Subject, Verdict};
 use abi::raw;
-use law::probe::{Form, PointEnd, PointStart, Probe};
+use law::probe::{Form, PointStart, Probe};
 use std::slice::from_ref;
 
 pub(super) fn instances_are_independent(subject: &Subject) -> Found {
@@ -153,7 +153,9 @@ fn after_other_instances(
     let varied = continuous(subject, specimen);
     let varying = |some: &[usize]| {
         let mut values = specimen.values.clone();
-        some.iter().for_each(|&i| values[i] *= 1.0 - 1e-3);
+        for &i in some {
+            values[i] *= 1.0 - 1e-3;
+        }
         specimen.with_values(&values)
     };
     // One whose parameters all differ makes a law forget what it kept of the others.
