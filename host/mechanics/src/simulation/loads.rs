@@ -130,6 +130,18 @@ impl Simulation {
         loads
     }
 
+    /// Tells the groups how fast their stress-free strains change on a leg of a phase.
+    pub(super) fn set_swelling(&mut self, number: usize, course: usize) {
+        let leg = leg(&self.problem.phases[number], course);
+        let [[t_0, f_0], [t_1, f_1]] = leg.unwrap_or([[0.0, 0.0], [1.0, 1.0]]);
+        let speed = (f_1 - f_0) / (t_1 - t_0);
+        let [start, end] = &self.loading;
+        let changes = start.strain.iter().zip(&end.strain);
+        for (group, (start, end)) in self.groups.iter_mut().zip(changes) {
+            group.swells_by([0, 1, 2].map(|c| speed * (end[c] - start[c])));
+        }
+    }
+
     /// Loads when the phase has changed its loads by this factor.
     pub(super) fn loading_at(&self, factor: f64) -> Loading {
         let [start, end] = &self.loading;
@@ -141,11 +153,12 @@ impl Simulation {
     }
 
     /// Goes on to the next leg of a phase, if there is one.
-    pub(super) fn next_leg(&self, number: usize, course: &mut PhaseCourse) -> bool {
+    pub(super) fn next_leg(&mut self, number: usize, course: &mut PhaseCourse) -> bool {
         if leg(&self.problem.phases[number], course.leg + 1).is_none() {
             return false;
         }
         course.leg += 1;
+        self.set_swelling(number, course.leg);
         let next = self.loads_on(number, course.leg, &course.prescribed);
         let last = std::mem::take(&mut course.loads);
         course.loads = Loads {
@@ -175,12 +188,16 @@ impl Simulation {
     }
 
     /// Takes note of what a phase ends with.
-    pub(super) fn keep_loads(&mut self, number: usize, prescribed: &[Prescribed]) {
-        let course = &self.problem.phases[number].course;
-        let Some(&[_, factor]) = course.last() else {
-            return;
+    pub(super) fn keep_loads(&mut self, number: usize, course: &PhaseCourse) {
+        let phase = &self.problem.phases[number];
+        let factor = match (phase.course.last(), leg(phase, course.leg)) {
+            (_, Some([[t_0, f_0], [t_1, f_1]])) if course.is_over => {
+                f_0 + (course.lambda - t_0) / (t_1 - t_0) * (f_1 - f_0)
+            }
+            (Some(&[_, factor]), _) => factor,
+            (None, _) => return,
         };
-        for &(dof, start, end) in prescribed {
+        for &(dof, start, end) in &course.prescribed {
             if let Some(value) = self.prescribed.get_mut(&dof) {
                 *value = part(factor, start, end);
             }
