@@ -251,7 +251,7 @@ pub struct LawInput {
     /// Shear zone: initial stress along it and out of plane over the normal traction; default 1.
     #[schemars(with = "Option<f64>", range(min = 0))]
     pub lateral_ratio: Option<Spanned<f64>>,
-    /// Its parameters.
+    /// Its parameters: numbers, choices, expressions.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, ParameterValue>")]
     pub parameters: ParameterTable,

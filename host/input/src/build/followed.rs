@@ -6,6 +6,7 @@ use crate::case::LawInput;
 use crate::expression::{Expression, Reference};
 use crate::ground::ProfileInput;
 use crate::material::{ParameterTable, ParameterValue, given, internal_variable, place_failure};
+use abi::Hypothesis;
 use law::{BuiltLaw, LoadedLaw, Operator, ParameterDescription};
 use mechanics::ground::InitialStresses;
 use mechanics::model;
@@ -267,8 +268,16 @@ impl LawShelf<'_> {
         let entry = self.law_named(law, asked)?;
         let (at, stress) = asked.place.ok_or(Without::Place)?;
         let loaded = self.kept(law, entry)?;
+        let hypothesis = self.hypothesis_of_ground();
+        if loaded.description().formulation(hypothesis).is_none() {
+            let message = format!(
+                "law `{law}` is no law of ground here: it is not made for {}",
+                hypothesis.name()
+            );
+            return Err(self.source.error(asked.by.clone(), message).into());
+        }
         let table = self.valued_on(law, entry, asked)?;
-        let built = self.built(law, (entry, &loaded, &table), asked)?;
+        let built = self.built(law, (entry, &loaded, &table))?;
         let mut initial = Vec::new();
         for (variable, value) in &self.tables().initial(entry) {
             let number = internal_variable(self.source, &built.law, law, variable)?;
@@ -287,22 +296,18 @@ impl LawShelf<'_> {
         Ok(operator)
     }
 
+    fn hypothesis_of_ground(&self) -> Hypothesis {
+        model::hypothesis(self.file.analysis, Formulation::Solid, false)
+    }
+
     /// A law of ground with these parameters, each combination once.
     fn built(
         &self,
         law: &str,
         (entry, loaded, table): (&LawInput, &LoadedLaw, &ParameterTable),
-        asked: &Asked<'_>,
     ) -> Result<Arc<BuiltLaw>, Without> {
         let placed = |failure| place_failure(self.source, &entry.law, table, &failure);
-        let hypothesis = model::hypothesis(self.file.analysis, Formulation::Solid, false);
-        if loaded.description().formulation(hypothesis).is_none() {
-            let message = format!(
-                "law `{law}` is no law of ground here: it is not made for {}",
-                hypothesis.name()
-            );
-            return Err(self.source.error(asked.by.clone(), message).into());
-        }
+        let hypothesis = self.hypothesis_of_ground();
         let (used, _) = loaded.values(&given(table)).map_err(placed)?;
         let bits = used.iter().map(|used| used.value.to_bits()).collect();
         let key = (law.to_owned(), bits);
