@@ -7,7 +7,7 @@ use super::state::PhaseCourse;
 use super::ties::Tied;
 use super::{Simulation, Warning, Watch};
 use crate::assembly::fold;
-use crate::equilibrium::Loads;
+use crate::equilibrium::{Loads, norm};
 use crate::error::Error;
 use crate::ground::{Acting, Loading};
 use crate::problem::{Axis, Phase};
@@ -139,6 +139,24 @@ impl Simulation {
         let changes = start.strain.iter().zip(&end.strain);
         for (group, (start, end)) in self.groups.iter_mut().zip(changes) {
             group.swells_by([0, 1, 2].map(|c| speed * (end[c] - start[c])));
+        }
+    }
+
+    /// Counts stress-free strains of a phase among the forces in play, with what they would call forth if they were
+    /// held: where nothing holds them, only round-off is left of these forces.
+    pub(super) fn count_swelling(&mut self) {
+        let mut force = vec![0.0; self.displacement.len()];
+        let [start, end] = &self.loading;
+        let strains = start.strain.iter().zip(&end.strain);
+        for (group, (start, end)) in self.groups.iter().zip(strains) {
+            if group.is_active {
+                let larger = |c: usize| start[c].abs().max(end[c].abs());
+                group.add_held([0, 1, 2].map(larger), &mut force);
+            }
+        }
+        self.largest_force = self.largest_force.max(norm(&force));
+        for (largest, force) in self.largest_forces.iter_mut().zip(force) {
+            *largest = largest.max(force.abs());
         }
     }
 

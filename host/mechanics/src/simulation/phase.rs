@@ -87,6 +87,7 @@ impl Simulation {
         let offsets = self.offsets();
         let loads = self.loads_on(number, 0, &prescribed);
         self.set_swelling(number, 0);
+        self.count_swelling();
         let (equations, loads) = self.equations_of(number, loads, None)?;
         let imbalance = equations.out_of_balance;
         let weight = crate::equilibrium::norm(&loads.force_start);

@@ -113,7 +113,8 @@ impl Simulation {
         let looked_at = watch.looks_at(When::Step, &self.groups);
         self.complete(phase, looked_at.as_ref())
             .map_err(|reason| self.incomplete(phase, place, lambda, reason))?;
-        let Some(value) = watch.quantity(&until.quantity, &self.snapshot()) else {
+        let value = watch.quantity(&until.quantity, &self.snapshot());
+        let Some(value) = value.filter(|value| value.is_finite()) else {
             return Ok(Verdict::GoesOn);
         };
         let Some([first, last]) = phase.course.measured else {

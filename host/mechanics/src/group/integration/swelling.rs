@@ -45,6 +45,27 @@ impl Group {
         })
     }
 
+    /// Adds the nodal forces that a stress-free strain calls forth if it is held, by the law's elastic operator.
+    pub(crate) fn add_held(&self, strain: [f64; 3], force: &mut [f64]) {
+        if strain.iter().all(|strain| *strain == 0.0) {
+            return;
+        }
+        let [e_11, e_22, e_33] = strain;
+        let mut flux = Vec::with_capacity(4 * self.kinematics.n_points());
+        for point in 0..self.kinematics.n_points() {
+            // A layer with an interface law has no operator of this size.
+            let Some(operator) = self.elastic_operator(point) else {
+                return;
+            };
+            let axes = self.kinematics.axes_at(point);
+            let [a, b, c, half_gamma] = axes.stress_from_global([e_11, e_22, e_33, 0.0]);
+            let own = [a, b, c, 2.0 * half_gamma];
+            let rows = operator.chunks_exact(4);
+            flux.extend(rows.map(|row| row.iter().zip(own).map(|(d, e)| d * e).sum::<f64>()));
+        }
+        self.kinematics.add_forces(&flux, force);
+    }
+
     /// Takes the stress-free strain out of the strains of the trial state, (1).
     pub(in crate::group) fn swell(&mut self, time_increment: f64) {
         let Some(swelling) = &mut self.swelling else {
