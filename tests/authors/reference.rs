@@ -166,8 +166,8 @@ impl Schema {
             let other = match key.as_str() {
                 "r" if same(keys.get("x"), keys.get("r")) => continue,
                 "z" if same(keys.get("y"), keys.get("z")) => continue,
-                "x" if keys.contains_key("r") => ", `r`",
-                "y" if keys.contains_key("z") => ", `z`",
+                "x" if same(keys.get("x"), keys.get("r")) => ", `r`",
+                "y" if same(keys.get("y"), keys.get("z")) => ", `z`",
                 _ => "",
             };
             let (mut takes, mut meaning) = (self.kind(value, places), text(value));

@@ -28,6 +28,7 @@ mod sections;
 mod setup;
 mod sliding_block;
 mod snap_back;
+mod strain;
 mod swap;
 mod thick_cylinder;
 mod thin_layer;

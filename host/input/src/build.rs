@@ -1,13 +1,17 @@
 //! From a case file to a problem in memory and the results that are wanted of it.
 
+mod followed;
 mod law_shelf;
+mod phases;
 mod places;
 mod unused_laws;
 
 use self::law_shelf::LawShelf;
+use self::phases::phase;
 use self::unused_laws::Look;
-use crate::case::{Case, CaseFile, GroupInput, PhaseInput};
-use crate::ground::{LevelInput, level};
+use crate::case::{Case, CaseFile, GroupInput, LawInput};
+use crate::expression::Expression;
+use crate::ground::{LevelInput, StressInput, level};
 use crate::material::LawTables;
 use crate::mesh::{self, Built, MeshFile};
 use crate::spanned::Given;
@@ -17,12 +21,11 @@ use law::{BuiltLaw, Pins, SearchPath, hexadecimal_sha256};
 use mechanics::Simulation;
 use mechanics::check::{Cause, Item};
 use mechanics::mesh::{Line, Mesh};
-use mechanics::problem::{
-    Axis, Displacement, ElementGroup, Force, Free, Phase, Pressure, Problem, Support,
-};
+use mechanics::problem::{ElementGroup, Ground, Material, Phase, Problem, Support};
 use mechanics::settings::Control;
 use mechanics::simulation::Warning;
 use results::{About, OutputRequest};
+use std::cell::RefCell;
 use std::sync::Arc;
 use text::Source;
 use toml::Spanned;
@@ -87,11 +90,22 @@ impl Case {
         let pins = file.laws.values().map(Spanned::get_ref);
         let pins = Pins::of(source, pins.map(|law| (&law.law, law.sha256.as_ref())))?;
         let search = SearchPath::of(&self.opener, &self.law_folders()?).pinned(pins);
+        let water = file.water.as_ref();
+        let water = water
+            .map(|water| water.get_ref().read(source))
+            .transpose()?;
+        let groups = file.groups.values();
+        let ground = groups.map(|group| ground(source, group.get_ref()));
         let mut shelf = LawShelf {
             source,
             file,
             search,
             laws: IndexMap::new(),
+            mesh: &mesh,
+            water: water.as_ref(),
+            ground: ground.collect::<Result<_, Error>>()?,
+            opened: RefCell::default(),
+            grounds: RefCell::default(),
         };
         refuse_unknown_groups(source, file)?;
         refuse_mesh_without_accuracy(source, file)?;
@@ -107,35 +121,19 @@ impl Case {
                 let mut laws = phase.laws.iter();
                 let swap = laws.find(|(key, _)| key.get_ref() == name.get_ref());
                 if let Some((_, law)) = swap {
-                    let material = shelf.material(name, input, law)?;
+                    let material = shelf.material(number, name, input, law)?;
                     own.get_or_insert_with(|| material.clone());
                     into.materials.push((number, material));
                 } else if own.is_none() {
-                    own = Some(shelf.material(name, input, &input.law)?);
+                    own = Some(shelf.material(number, name, input, &input.law)?);
                 }
             }
             let material = match own {
                 Some(material) => material,
-                None => shelf.material(name, input, &input.law)?,
+                None => shelf.material(number, name, input, &input.law)?,
             };
-            groups.push(ElementGroup {
-                name: name.get_ref().clone(),
-                formulation: input.formulation,
-                material,
-                integration: input.integration.value(),
-                normal: input.normal.value().map(Into::into),
-                in_plane: input.in_plane.value(),
-                initial_stress: match &input.initial_stress {
-                    Some(stress) => Some(stress.get_ref().read(source, stress.span())?),
-                    None => None,
-                },
-                unit_weight: input.unit_weight.value().unwrap_or(0.0),
-                saturated_unit_weight: input.saturated_unit_weight.value(),
-                pore_water: input.pore_water.unwrap_or(true),
-                is_active: input.active.unwrap_or(true),
-                drainage: input.drainage.value().unwrap_or_default(),
-                undrained_poisson_ratio: input.undrained_poisson_ratio.value().unwrap_or(0.495),
-            });
+            let ground = shelf.ground[number].clone();
+            groups.push(element_group(name, input, ground, material));
         }
         let spare = shelf.spare(look, self.stands_alone())?;
         let water_levels = water_levels(source, file, &mesh, &phases)?;
@@ -143,21 +141,18 @@ impl Case {
             line: support.line.get_ref().clone(),
             fixed: support.fixed.iter().map(|&axis| axis.into()).collect(),
         });
+        let laws = shelf.laws;
         Ok(Posed {
             problem: Problem {
                 analysis: file.analysis,
                 mesh,
                 groups,
-                water: file
-                    .water
-                    .as_ref()
-                    .map(|water| water.get_ref().read(source))
-                    .transpose()?,
+                water,
                 supports: supports.collect(),
                 phases,
                 settings: *file.solver.get_ref(),
             },
-            laws: shelf.laws,
+            laws,
             notes: mesh_file
                 .iter()
                 .flat_map(|file| file.notes.clone())
@@ -181,7 +176,10 @@ impl Case {
             .values()
             .map(|group| group.get_ref().law.get_ref());
         let later = file.phases.iter().flat_map(|phase| phase.laws.values());
-        let used: Vec<&String> = own.chain(later.map(Spanned::get_ref)).collect();
+        let mut used: Vec<&str> = own.map(String::as_str).collect();
+        used.extend(later.map(|law| law.get_ref().as_str()));
+        let others = referred(file);
+        used.extend(others.iter().map(String::as_str));
         let tables = LawTables {
             source: &self.source,
             tables: &file.laws,
@@ -191,7 +189,7 @@ impl Case {
             .iter()
             .filter(|(_, entry)| !tables.is_filler(entry.get_ref()))
             .map(|(name, _)| name.get_ref())
-            .filter(|name| !used.contains(name));
+            .filter(|name| !used.contains(&name.as_str()));
         let names: Vec<String> = unused.map(|name| format!("`{name}`")).collect();
         (!names.is_empty())
             .then(|| format!("no group takes the laws {} of [laws]", names.join(", ")))
@@ -216,6 +214,21 @@ impl Case {
             follows_path: self.file.solver.get_ref().control == Control::ArcLength,
         };
         let columns: Vec<&str> = wanted.columns().collect();
+        for until in self
+            .file
+            .phases
+            .iter()
+            .filter_map(|phase| phase.until.as_ref())
+        {
+            let quantity = &until.get_ref().quantity;
+            if !columns.contains(&quantity.get_ref().as_str()) {
+                let known = columns.iter().copied();
+                let error = self
+                    .source
+                    .unknown("probe or column of a pile", quantity, known);
+                return Err(error.into());
+            }
+        }
         wanted.figures = figures::case_figures(self, &columns)?;
         Ok(wanted)
     }
@@ -246,9 +259,31 @@ impl Case {
             mesh_file: mesh_file.map(|file| (file.path.clone(), file.sha256.clone())),
             laws_of_groups: file.groups.iter().map(laws_of).collect(),
             laws: laws.clone(),
+            expressions: self.expressions(),
             probe_units: probes::units(self, laws),
             chosen: file.chosen.as_ref().map(|chosen| serde_json::json!(chosen)),
         }
+    }
+
+    /// Parameters that follow from others: name of the law, parameter, expression.
+    fn expressions(&self) -> Vec<[String; 3]> {
+        let tables = LawTables {
+            source: &self.source,
+            tables: &self.file.laws,
+        };
+        let of_law = |(name, entry): (&Spanned<String>, &Spanned<LawInput>)| {
+            let all = tables.parameters(entry.get_ref());
+            let expressions = all.iter().filter_map(|(id, value)| {
+                let text = value.get_ref().expression()?;
+                Some([
+                    name.get_ref().clone(),
+                    id.get_ref().clone(),
+                    format!("={text}"),
+                ])
+            });
+            expressions.collect::<Vec<_>>()
+        };
+        self.file.laws.iter().flat_map(of_law).collect()
     }
 
     /// Warnings about implausible input of the case, besides those of its problem.
@@ -324,6 +359,55 @@ impl Case {
     }
 }
 
+/// What a group is as ground before the first phase.
+fn ground(source: &Source, input: &GroupInput) -> Result<Ground, Error> {
+    let stress = input.initial_stress.as_ref();
+    let read = |stress: &Spanned<StressInput>| stress.get_ref().read(source, stress.span());
+    let dry = input.unit_weight.value().unwrap_or(0.0);
+    Ok(Ground {
+        initial_stress: stress.map(read).transpose()?,
+        unit_weight: [dry, input.saturated_unit_weight.value().unwrap_or(dry)],
+        pore_water: input.pore_water.unwrap_or(true),
+        is_active: input.active.unwrap_or(true),
+    })
+}
+
+fn element_group(
+    name: &Spanned<String>,
+    input: &GroupInput,
+    ground: Ground,
+    material: Material,
+) -> ElementGroup {
+    ElementGroup {
+        name: name.get_ref().clone(),
+        formulation: input.formulation,
+        material,
+        integration: input.integration.value(),
+        normal: input.normal.value().map(Into::into),
+        in_plane: input.in_plane.value(),
+        initial_stress: ground.initial_stress,
+        unit_weight: ground.unit_weight[0],
+        saturated_unit_weight: input.saturated_unit_weight.value(),
+        pore_water: ground.pore_water,
+        is_active: ground.is_active,
+        drainage: input.drainage.value().unwrap_or_default(),
+        undrained_poisson_ratio: input.undrained_poisson_ratio.value().unwrap_or(0.495),
+    }
+}
+
+/// Names of laws that expressions take values from.
+fn referred(file: &CaseFile) -> Vec<String> {
+    let laws = file.laws.values().map(Spanned::get_ref);
+    let values = laws.flat_map(|law| law.parameters.values());
+    let texts = values.filter_map(|value| value.get_ref().expression());
+    let expressions = texts.filter_map(|text| Expression::parse(text).ok());
+    let names = expressions.flat_map(|expression| {
+        let references = expression.references().into_iter();
+        references.map(|of| of.law().to_owned()).collect::<Vec<_>>()
+    });
+    names.collect()
+}
+
 /// Refuses the error of the mesh as a part of nothing.
 fn refuse_mesh_without_accuracy(source: &Source, file: &CaseFile) -> Result<(), Error> {
     match &file.accuracy_with_mesh {
@@ -342,7 +426,8 @@ fn refuse_unknown_groups(source: &Source, file: &CaseFile) -> Result<(), Error> 
     let named = file.phases.iter().flat_map(|phase| {
         let lists = phase.activate.iter().chain(&phase.deactivate);
         let tables = phase.laws.keys().chain(phase.unit_weight.keys());
-        lists.chain(tables).chain(phase.drainage.keys())
+        let tables = tables.chain(phase.drainage.keys());
+        lists.chain(tables).chain(phase.strain.keys())
     });
     for group in named {
         if !names().any(|name| name == group.get_ref()) {
@@ -410,78 +495,4 @@ fn water_levels(
         }
     }
     Ok(notes)
-}
-
-/// A phase without its laws.
-fn phase(source: &Source, file: &CaseFile, input: &PhaseInput) -> Result<Phase, Error> {
-    let axes = |axes: &[crate::case::Axis]| -> Vec<Axis> {
-        axes.iter().map(|&axis| axis.into()).collect()
-    };
-    // Unknown names were refused.
-    let number = |name: &Spanned<String>| {
-        file.groups
-            .keys()
-            .position(|key| key.get_ref() == name.get_ref())
-    };
-    let numbers = |names: &[Spanned<String>]| names.iter().filter_map(number).collect();
-    let displacement = input.displacement.iter().map(|input| Displacement {
-        line: input.line.get_ref().clone(),
-        x: input.x,
-        y: input.y,
-    });
-    let free = input.free.iter().map(|input| Free {
-        line: input.line.get_ref().clone(),
-        components: axes(&input.components),
-    });
-    let pressure = input.pressure.iter().map(|input| {
-        Ok(Pressure {
-            line: input.line.get_ref().clone(),
-            value: input.value.get_ref().read(source, input.value.span())?,
-        })
-    });
-    let force = input.force.iter().map(|input| Force {
-        line: input.line.get_ref().clone(),
-        x: input.x,
-        y: input.y,
-    });
-    let weights = input.unit_weight.iter();
-    let drainage = input.drainage.iter();
-    let course = input.course.as_ref();
-    let water = input.water.as_ref();
-    Ok(Phase {
-        name: input.name.get_ref().clone(),
-        increments: *input.increments.get_ref(),
-        time: input.time.value(),
-        materials: Vec::new(),
-        activate: numbers(&input.activate),
-        deactivate: numbers(&input.deactivate),
-        unit_weight: weights
-            .filter_map(|(name, weight)| Some((number(name)?, *weight.get_ref())))
-            .collect(),
-        water_level: water
-            .map(|water| level(source, &water.get_ref().level))
-            .transpose()?,
-        drainage: drainage
-            .filter_map(|(name, drainage)| Some((number(name)?, *drainage.get_ref())))
-            .collect(),
-        rigid: input
-            .rigid
-            .iter()
-            .map(|line| line.get_ref().clone())
-            .collect(),
-        course: match course {
-            Some(course) if course.get_ref().is_empty() => {
-                let message = "`course` is empty; left out, a phase's loads rise straight";
-                return Err(source.error(course.span(), message).into());
-            }
-            course => course
-                .map(|course| course.get_ref().clone())
-                .unwrap_or_default(),
-        },
-        force: force.collect(),
-        reset_displacements: input.reset_displacements,
-        displacement: displacement.collect(),
-        free: free.collect(),
-        pressure: pressure.collect::<Result<_, Error>>()?,
-    })
 }

@@ -251,7 +251,7 @@ pub struct LawInput {
     /// Shear zone: initial stress along it and out of plane over the normal traction; default 1.
     #[schemars(with = "Option<f64>", range(min = 0))]
     pub lateral_ratio: Option<Spanned<f64>>,
-    /// Its parameters.
+    /// Its parameters: numbers, choices, expressions.
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, ParameterValue>")]
     pub parameters: ParameterTable,
@@ -418,6 +418,15 @@ pub struct PhaseInput {
     /// to 1.
     #[schemars(with = "Option<Vec<[f64; 2]>>")]
     pub course: Option<Spanned<Vec<[f64; 2]>>>,
+    /// It ends before that where a quantity reaches a value. Loads and displacements stay where they are
+    /// then.
+    #[schemars(with = "Option<UntilInput>")]
+    pub until: Option<Spanned<UntilInput>>,
+    /// Stress-free strains of groups at its end, expansion positive, since the start: heat, swelling,
+    /// shrinkage.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, StrainInput>")]
+    pub strain: Named<StrainInput>,
     /// Forces at its end.
     #[serde(default)]
     pub force: Vec<ForceInput>,
@@ -433,6 +442,47 @@ pub struct PhaseInput {
     /// Pressures at its end, kPa.
     #[serde(default)]
     pub pressure: Vec<PressureInput>,
+}
+
+/// What ends a phase.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct UntilInput {
+    /// Probe, or column of the pile in `history.csv`.
+    #[schemars(with = "String")]
+    pub quantity: Spanned<String>,
+    /// The value that ends the phase, from whichever side it is reached.
+    pub reaches: f64,
+}
+
+/// A stress-free strain, expansion positive.
+#[derive(Clone, Copy, Debug, Deserialize, JsonSchema)]
+#[serde(
+    untagged,
+    expecting = "expected a strain such as `1e-4`, or one by direction: `{ r = …, z = …, theta = … }` in axisymmetry, \
+                 `{ x = …, y = …, z = … }` in plane strain"
+)]
+pub enum StrainInput {
+    /// In all directions.
+    Isotropic(f64),
+    /// By direction.
+    Directed(DirectedStrain),
+}
+
+/// A stress-free strain by direction; what is left out is 0.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct DirectedStrain {
+    /// Axisymmetry: radial.
+    pub r: Option<f64>,
+    /// Axisymmetry: around the axis.
+    pub theta: Option<f64>,
+    /// Plane strain: in the plane.
+    pub x: Option<f64>,
+    /// Plane strain: in the plane.
+    pub y: Option<f64>,
+    /// Axisymmetry: along the axis. Plane strain: out of plane.
+    pub z: Option<f64>,
 }
 
 /// Prescribed displacements of a line, m.

@@ -7,6 +7,7 @@ pub mod calibration;
 pub mod case;
 pub mod driver;
 mod error;
+mod expression;
 pub mod figures;
 pub mod gmsh;
 mod grid;

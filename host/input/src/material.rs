@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::case::LawInput;
+use crate::expression::Expression;
 use crate::ground::Over;
 use crate::spanned::Given;
 use abi::Hypothesis;
@@ -28,10 +29,20 @@ pub enum ParameterValue {
     Number(f64),
     /// A whole number.
     Integer(i64),
-    /// The label of a choice.
+    /// The label of a choice; in a case also an expression such as `= 0.7 * clay.cohesion`.
     Label(String),
     /// In a case: values over the height; each element takes that at its centre.
     Varying(Over),
+}
+
+impl ParameterValue {
+    /// The text of its expression, if it is one.
+    pub(crate) fn expression(&self) -> Option<&str> {
+        match self {
+            Self::Label(label) => Expression::text(label),
+            _ => None,
+        }
+    }
 }
 
 /// Parameters of a law as written in a file.
@@ -61,10 +72,14 @@ pub fn build_law(
     hypothesis: Hypothesis,
     parameters: &ParameterTable,
 ) -> Result<BuiltLaw, Error> {
-    let varies =
-        |value: &&Spanned<ParameterValue>| matches!(value.get_ref(), ParameterValue::Varying(_));
-    if let Some(value) = parameters.values().find(varies) {
-        let message = "one point has no height for a parameter to vary with";
+    for value in parameters.values() {
+        let message = match value.get_ref() {
+            ParameterValue::Varying(_) => "one point has no height for a parameter to vary with",
+            other if other.expression().is_some() => {
+                "an expression takes its values from the laws of a case, and this is no case"
+            }
+            _ => continue,
+        };
         return Err(source.error(value.span(), message).into());
     }
     try_law(loaded, hypothesis, parameters).map_err(|failure| {

@@ -116,6 +116,14 @@ table! {
         "`time` is {time}, expected above 0 and at most {LONGEST:e}: how long the phase takes");
     Cause::BadCourse => ("a `course` leads from [0, 0] to time 1: pairs [time, factor] with rising times");
     Cause::CourseOfArcLength => ("a `course` has a time of its own, arc-length control another");
+    Cause::UntilBeside(key) => (
+        "`until` may end this phase before its time, and `{key}` would be left half done")
+        hint ("give `{key}` a phase of its own before this one");
+    Cause::StrainOfInterface(group) => ("group `{group}` has no thickness, and so no strain")
+        hint ("give the strain to the ground or the pile beside it");
+    Cause::StrainUnderArcLength => (
+        "`strain` follows the course of the phase, and arc-length control leads it along another")
+        hint ("`control = \"auto\"` in [solver]");
     Cause::NoWater => ("this phase changes the water, and there is none");
     Cause::AtRestOutsideStrength {
         group, material, at: [x, y], stress: [h, v], returned: [r_h, r_v]

@@ -277,10 +277,26 @@ impl Law {
         flux: &[f64],
         operator: Operator,
     ) -> Result<(Vec<f64>, Vec<f64>), BatchFailure> {
+        self.at_rest_from(flux, &[], operator)
+    }
+
+    /// The same where some internal variables, by number, begin with other values than the law's own.
+    ///
+    /// # Errors
+    /// As [`Self::at_rest`].
+    pub fn at_rest_from(
+        &self,
+        flux: &[f64],
+        initial: &[(usize, f64)],
+        operator: Operator,
+    ) -> Result<(Vec<f64>, Vec<f64>), BatchFailure> {
         let n = self.n_components();
         let rows = Strided::rows(n);
         let zero = vec![0.0; n];
-        let state = self.initial_state(1, (flux, rows))?;
+        let mut state = self.initial_state(1, (flux, rows))?;
+        for &(number, value) in initial {
+            state[number] = value;
+        }
         let (mut flux_end, mut state_end) = (flux.to_vec(), state.clone());
         let mut written = vec![0.0; operator.n_entries(n)];
         let start = Start {

@@ -14,7 +14,8 @@ mod loading;
 mod overburden;
 
 pub use body_forces::Acting;
-pub(crate) use initial::{InitialStresses, beside_joints};
+pub use initial::InitialStresses;
+pub(crate) use initial::beside_joints;
 pub(crate) use loading::unit_pressure;
 pub use loading::{Loading, pressure_on};
 pub use overburden::Columns;

@@ -25,7 +25,7 @@ use crate::element::Kinematics;
 use crate::problem::{Formulation, InPlane, Material};
 use abi::status::Outcome;
 use diagnosis::Bond;
-use integration::{CallContext, Layer, PointTangents, Pores, Varying};
+use integration::{CallContext, Layer, PointTangents, Pores, Swelling, Varying};
 use law::{BatchFailure, Moment, Operator, current_call};
 
 /// Points that one thread takes at a time where little is done with each.
@@ -40,7 +40,7 @@ pub struct Group {
     pub formulation: Formulation,
     /// The elements.
     pub kinematics: Box<dyn Kinematics>,
-    /// Strains (zero thickness: jumps) in axes of the elements.
+    /// Strains (zero thickness: jumps) in axes of the elements, without stress-free ones.
     pub strain: Field,
     /// Stresses (zero thickness: tractions) in axes of the elements.
     pub stress: Field,
@@ -60,6 +60,8 @@ pub struct Group {
     layer: Option<Layer>,
     /// Pore water that follows the deformation, if it does or did.
     pores: Option<Pores>,
+    /// Stress-free strain, if a phase gives it one.
+    swelling: Option<Swelling>,
     calls: CallContext,
     tangents: PointTangents,
     /// The trial state is the answer of the law, which starts now, to the committed one over a zero increment.
@@ -100,6 +102,7 @@ impl Group {
             is_active: true,
             layer,
             pores: None,
+            swelling: None,
             calls: CallContext::default(),
             tangents: PointTangents::default(),
             is_asked: false,
@@ -136,6 +139,9 @@ impl Group {
     pub fn appear(&mut self, stress: Vec<f64>) -> Result<(), PointFailure> {
         self.is_active = true;
         self.strain.committed.fill(0.0);
+        if let Some(swelling) = &mut self.swelling {
+            swelling.strain.committed.fill(0.0);
+        }
         self.stress = Field::new(stress);
         self.start_law(self.law.clone(), None)
     }
@@ -212,6 +218,7 @@ impl Group {
         let element_n = self.kinematics.n_components();
         let n_points = self.kinematics.n_points();
         let is_uniform = self.calls.varying.is_none() && self.pores.is_none();
+        let is_uniform = is_uniform && self.swelling.is_none();
         self.tangents.are_constant = law.formulation().linear && is_uniform && !self.uses_layer();
         if self.tangents.are_constant {
             let one = self

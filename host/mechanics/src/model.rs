@@ -94,7 +94,7 @@ impl Model {
             first.push(own.unwrap_or_else(|| group.material.clone()));
         }
         let surroundings = Surroundings::new(problem);
-        let initial = InitialStresses::new(problem);
+        let initial = InitialStresses::of(problem);
         let mut groups = Vec::new();
         let mut ties = Ties::default();
         for (number, material) in first.into_iter().enumerate() {
@@ -106,7 +106,12 @@ impl Model {
                 number,
                 group: &problem.groups[number],
             };
-            groups.push(builder.build(material, &mut ties)?);
+            let mut group = builder.build(material, &mut ties)?;
+            let mut strains = problem.phases.iter().flat_map(|phase| &phase.strain);
+            if strains.any(|(of, _)| *of == number) {
+                group.may_swell();
+            }
+            groups.push(group);
         }
         let ties = ties.ties;
         let mut warnings = constraints::check(problem, &ties)?;

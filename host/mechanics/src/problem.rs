@@ -4,7 +4,7 @@
 mod ground;
 pub(crate) mod tied_dofs;
 
-pub use ground::{AtRest, Drainage, InitialStress, Profile, Ratio, Water};
+pub use ground::{AtRest, Drainage, Ground, InitialStress, Profile, Ratio, Water};
 
 use crate::mesh::Mesh;
 use crate::settings::Settings;
@@ -94,9 +94,17 @@ pub struct Material {
     pub built: Arc<BuiltLaw>,
     /// Initial values of internal variables that override the law's own, by number.
     pub initial: Vec<(usize, f64)>,
-    /// Parameters that vary with the height y (z), by name; `built` has their values somewhere. Each
-    /// element takes those at its centre.
-    pub varying: Vec<(String, Profile)>,
+    /// Parameters that vary from element to element, by name; `built` has their values somewhere.
+    pub varying: Vec<(String, Variation)>,
+}
+
+/// Values of a parameter that varies from element to element.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Variation {
+    /// Over the height y (z): each element takes the value at its centre.
+    Height(Profile),
+    /// Of every element of a group, in their order.
+    Elements(Vec<f64>),
 }
 
 impl Material {
@@ -213,6 +221,11 @@ pub struct Phase {
     /// What the phase changes, as a factor on the change, by the share of the phase's time, from 0 to 1: pairs of
     /// time and factor, linear between. Empty: a straight ramp from 0 to 1.
     pub course: Vec<[f64; 2]>,
+    /// It ends before its time where a quantity reaches a value.
+    pub until: Option<Until>,
+    /// Stress-free strains of groups, by number, as totals at the end of the phase: components 11 22 33, expansion
+    /// positive.
+    pub strain: Vec<(usize, [f64; 3])>,
     /// Forces, as totals at the end of the phase.
     pub force: Vec<Force>,
     /// Displacements are counted from the start of this phase.
@@ -255,6 +268,8 @@ impl Phase {
             drainage: Vec::new(),
             rigid: Vec::new(),
             course: Vec::new(),
+            until: None,
+            strain: Vec::new(),
             force: Vec::new(),
             reset_displacements: false,
             displacement: Vec::new(),
@@ -262,6 +277,15 @@ impl Phase {
             pressure: Vec::new(),
         }
     }
+}
+
+/// Where a phase ends before its time. Whoever watches the simulation measures the quantity.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Until {
+    /// Name of the quantity.
+    pub quantity: String,
+    /// The value that ends the phase, in the quantity's unit.
+    pub reaches: f64,
 }
 
 /// Prescribed displacements of a line, m.

@@ -18,6 +18,7 @@ mod statics;
 mod steps;
 mod tangents;
 mod ties;
+mod until;
 mod validity;
 mod warning;
 
@@ -25,6 +26,7 @@ pub use observer::{Increment, Part, Watch, When};
 pub use path_dependence::Neighbour;
 pub use phase_statistics::PhaseRecord;
 pub use state::State;
+pub use until::Reached;
 pub use warning::Warning;
 
 use crate::assembly::Tie;
@@ -343,16 +345,17 @@ impl Simulation {
                 continue;
             };
             let n = self.problem.phases[phase.number].increments;
-            if phase.course.increment >= n {
+            if phase.course.is_over || phase.course.increment >= n {
                 self.end_phase(&phase, watch);
                 continue;
             }
             let outcome = self.increment(&mut phase, watch);
             self.under_way = Some(phase);
-            let outcome = outcome.and_then(|increment| {
-                self.hand_out_state(&increment, watch)?;
-                Ok(increment)
-            });
+            let outcome = match outcome {
+                Ok(None) => continue,
+                Ok(Some(increment)) => self.hand_out_state(&increment, watch).map(|()| increment),
+                Err(error) => Err(error),
+            };
             if let Err(error) = &outcome
                 && let Some(phase) = self.under_way.take()
             {
@@ -386,12 +389,12 @@ impl Simulation {
         Ok(())
     }
 
-    /// The next increment of a phase.
+    /// The next increment of a phase; `None` if the phase turns out to have none.
     fn increment(
         &mut self,
         phase: &mut UnderWay,
         watch: &mut dyn Watch,
-    ) -> Result<Increment, Error> {
+    ) -> Result<Option<Increment>, Error> {
         let input = &self.problem.phases[phase.number];
         let n = input.increments;
         let increment = phase.course.increment + 1;
@@ -420,10 +423,11 @@ impl Simulation {
                 return Err(error);
             }
         };
-        let when = When::Increment {
-            place: &place,
-            of: n,
-        };
+        if phase.course.is_over && phase.course.lambda <= 0.0 {
+            return Ok(None);
+        }
+        let of = if phase.course.is_over { increment } else { n };
+        let when = When::Increment { place: &place, of };
         let looked_at = watch.looks_at(when, &self.groups);
         let lambda = phase.course.lambda;
         self.complete(phase, looked_at.as_ref())
@@ -441,13 +445,13 @@ impl Simulation {
         phase.course.increment = increment;
         let done = Increment {
             time: self.clock(phase.number).at(lambda),
-            of: n,
+            of,
             iterations: done.iterations,
             unreliable: done.unreliable,
             place,
         };
         go_on(watch.increment(&done, &self.snapshot()))?;
-        Ok(done)
+        Ok(Some(done))
     }
 
     /// Says, once of each, which bonds that began without normal stress have opened.

@@ -9,11 +9,12 @@ use input::{Case, Error};
 use law::Stop;
 use mechanics::check::Compatibility;
 use mechanics::group::Group;
-use mechanics::simulation::{Increment, Warning};
+use mechanics::simulation::{Increment, Snapshot, Warning};
 use mechanics::{State, Watch};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use results::OutputRequest;
 use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
 
 /// A problem on its way through its phases, in memory.
@@ -34,6 +35,8 @@ struct Inner {
     /// The last increment of the last phase is done. The simulation is not led beyond it: a state could not be taken
     /// of it any more.
     is_done: bool,
+    /// What the case measures, if that may end a phase.
+    wanted: Option<Arc<OutputRequest>>,
     case: Case,
     written: Option<String>,
 }
@@ -81,16 +84,23 @@ impl SimulationState {
     }
 }
 
-/// Hands on requests to stop and warnings.
-struct Follower<'c>(&'c Caller<String>);
+/// Hands on requests to stop and warnings, and measures what may end a phase.
+struct Follower<'c> {
+    caller: &'c Caller<String>,
+    wanted: Option<&'c OutputRequest>,
+}
 
 impl Watch for Follower<'_> {
     fn warning(&mut self, warning: &Warning) {
-        self.0.tell(warning.to_string());
+        self.caller.tell(warning.to_string());
+    }
+
+    fn quantity(&mut self, name: &str, state: &Snapshot<'_>) -> Option<f64> {
+        self.wanted?.quantity(name, state)
     }
 
     fn stop(&self) -> Stop {
-        self.0.stop()
+        self.caller.stop()
     }
 }
 
@@ -131,13 +141,15 @@ impl Simulation {
         let mut inner = self.inner()?;
         let Inner {
             simulation,
+            wanted,
             case,
             written,
             ..
         } = &mut *inner;
+        let wanted = wanted.as_deref();
         let outcome = carry_out(
             py,
-            |caller| work(simulation, &mut Follower(caller)),
+            |caller| work(simulation, &mut Follower { caller, wanted }),
             |py, warning: String| warn(py, &warning),
         )?;
         outcome.map_err(|error| exception(py, &case.place(error), written.as_deref()))
@@ -203,12 +215,16 @@ impl Simulation {
                 let all = of_laws.chain(simulation.warnings()).chain(&ready.notes);
                 all.for_each(|warning| caller.tell(warning.clone()));
                 let kept = ready.mesh_file.map(|file| file.kept.into());
-                Ok((simulation, kept, case))
+                let phases = &simulation.problem().phases;
+                let measures = phases.iter().any(|phase| phase.until.is_some());
+                let wanted = measures.then(|| case.wanted(&simulation)).transpose()?;
+                let wanted = wanted.map(Arc::new);
+                Ok((simulation, wanted, kept, case))
             },
             |py, warning| warn(py, &warning),
         )?;
         let written = posed.written().map(str::to_owned);
-        let (simulation, kept, case) =
+        let (simulation, wanted, kept, case) =
             made.map_err(|error| exception(py, &error, written.as_deref()))?;
         Ok(Self {
             inner: Mutex::new(Inner {
@@ -216,6 +232,7 @@ impl Simulation {
                 kept,
                 likeness: None,
                 is_done: false,
+                wanted,
                 case,
                 written,
             }),
@@ -417,6 +434,7 @@ impl Simulation {
         let Inner {
             simulation,
             is_done,
+            wanted,
             case,
             written,
             likeness,
@@ -447,6 +465,7 @@ impl Simulation {
                 kept: kept.clone(),
                 likeness: likeness.clone(),
                 is_done: *is_done,
+                wanted: wanted.clone(),
                 case: case.clone(),
                 written: written.clone(),
             }),

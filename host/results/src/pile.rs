@@ -15,6 +15,7 @@
 mod criteria;
 mod geometry;
 mod plausibility;
+mod plunge;
 mod table;
 
 pub use criteria::{Curve, Resistances};

@@ -3,6 +3,8 @@
 //! is in its file. Files of an earlier run are removed first. A resumed run continues them from its
 //! last checkpoint.
 
+mod quantity;
+
 use crate::fields::{self, Fields, Written};
 use crate::figure::{Curve, Figures};
 use crate::file::{self, Extent};
@@ -20,7 +22,7 @@ use crate::table::{Cell, Table};
 use mechanics::equilibrium::Iteration;
 use mechanics::group::Group;
 use mechanics::simulation::{self, Increment, PhaseRecord, Snapshot};
-use mechanics::{NoEquilibrium, Place, Problem, Simulation};
+use mechanics::{NoEquilibrium, Place, Simulation};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -516,8 +518,8 @@ impl Recorder {
     }
 
     /// At which load of its head the pile found no further equilibrium.
-    pub fn plunge(&self, problem: &Problem, none: &NoEquilibrium) -> Option<String> {
-        self.pile.as_ref()?.pile.plunge(problem, none)
+    pub fn plunge(&self, simulation: &Simulation, none: &NoEquilibrium) -> Option<String> {
+        self.pile.as_ref()?.pile.plunge(simulation, none)
     }
 
     /// Resistances of the pile, if there is one.

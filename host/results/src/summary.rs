@@ -166,6 +166,17 @@ pub(crate) struct Law {
     pub(crate) shear_zone: Option<ShearZone>,
     #[serde(skip_serializing_if = "Named::is_empty")]
     pub(crate) initial: Named<f64>,
+    #[serde(skip_serializing_if = "Named::is_empty")]
+    pub(crate) expressions: Named<Expression>,
+}
+
+/// A parameter that follows from others, with its smallest and largest value.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Expression {
+    pub(crate) expression: String,
+    pub(crate) smallest: f64,
+    pub(crate) largest: f64,
 }
 
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]

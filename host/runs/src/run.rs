@@ -13,7 +13,7 @@ use keeper::Keeper;
 use law::{Stop, hexadecimal_sha256};
 use mechanics::equilibrium::{Iteration, Reason, Reuse};
 use mechanics::group::Group;
-use mechanics::simulation::{Increment, Part, PhaseRecord, Snapshot, Warning, When};
+use mechanics::simulation::{Increment, Part, PhaseRecord, Reached, Snapshot, Warning, When};
 use mechanics::{Place, Problem, Simulation, State, Watch};
 use results::output_request::OutputRequest;
 use results::pile::Resistances;
@@ -343,7 +343,7 @@ impl Follower<'_> {
         }
         let outcome = outcome.map_err(|error| {
             if let mechanics::Error::NoEquilibrium(none) = &error
-                && let Some(plunge) = self.results.plunge(simulation.problem(), none)
+                && let Some(plunge) = self.results.plunge(simulation, none)
             {
                 self.observer.note(&plunge);
             }
@@ -480,6 +480,14 @@ impl Watch for Follower<'_> {
     fn at_rest(&mut self, phase: &str, share: f64) {
         self.results.at_rest(phase, share);
         self.observer.at_rest(phase, share);
+    }
+
+    fn quantity(&mut self, name: &str, state: &Snapshot<'_>) -> Option<f64> {
+        self.results.quantity(name, state)
+    }
+
+    fn reached(&mut self, end: &Reached) {
+        self.observer.note(&end.to_string());
     }
 
     fn phase_ends(&mut self, record: PhaseRecord) {

@@ -5,13 +5,16 @@ use crate::Error;
 use crate::case::{CaseFile, GroupInput, LawInput};
 use crate::ground::ProfileInput;
 use crate::material::{
-    LawTables, ParameterValue, ZONE, internal_variable, is_solid_at_interface, place_failure,
-    try_law,
+    LawTables, ParameterTable, ParameterValue, ZONE, internal_variable, is_solid_at_interface,
+    place_failure, try_law,
 };
 use abi::Hypothesis;
-use law::{BuildCause, LoadedLaw, SearchPath};
+use law::{BuildCause, BuiltLaw, LoadedLaw, SearchPath};
+use mechanics::mesh::Mesh;
 use mechanics::model;
-use mechanics::problem::{Formulation, Material, Profile};
+use mechanics::problem::{Formulation, Ground, Material, Variation, Water};
+use std::cell::RefCell;
+use std::collections::HashMap;
 use std::sync::Arc;
 use text::{Source, suggestion};
 use toml::Spanned;
@@ -22,6 +25,12 @@ pub(super) struct LawShelf<'a> {
     pub(super) file: &'a CaseFile,
     pub(super) search: SearchPath,
     pub(super) laws: Laws,
+    /// What parameters may follow from: the ground of every group, and laws of it.
+    pub(super) mesh: &'a Mesh,
+    pub(super) water: Option<&'a Water>,
+    pub(super) ground: Vec<Ground>,
+    pub(super) opened: RefCell<HashMap<String, LoadedLaw>>,
+    pub(super) grounds: RefCell<HashMap<(String, Vec<u64>), Arc<BuiltLaw>>>,
 }
 
 impl<'a> LawShelf<'a> {
@@ -51,9 +60,10 @@ impl<'a> LawShelf<'a> {
         }
     }
 
-    /// The law of this name, for a group.
+    /// The law of this name, for a group by its number.
     pub(super) fn material(
         &mut self,
+        number: usize,
         group_name: &Spanned<String>,
         group: &GroupInput,
         name: &Spanned<String>,
@@ -66,13 +76,13 @@ impl<'a> LawShelf<'a> {
             });
         let hypothesis = model::hypothesis(self.file.analysis, group.formulation, is_interface_law);
         let key = (name.get_ref().clone(), hypothesis.name());
+        let (parameters, elements) = self.valued_in(number, name.get_ref(), entry)?;
         let built = if let Some(built) = self.laws.get(&key) {
             Arc::clone(built)
         } else {
-            let parameters = &self.tables().parameters(entry);
             let loaded = self.loaded(entry)?;
-            let built = try_law(&loaded, hypothesis, parameters).map_err(|failure| {
-                let error = place_failure(self.source, &entry.law, parameters, &failure);
+            let built = try_law(&loaded, hypothesis, &parameters).map_err(|failure| {
+                let error = place_failure(self.source, &entry.law, &parameters, &failure);
                 if !matches!(failure.cause, BuildCause::Hypothesis { .. }) {
                     error
                 } else if let Some(adapter) =
@@ -99,7 +109,12 @@ impl<'a> LawShelf<'a> {
             built
         };
         let mut material = Material::new(name.get_ref(), built);
-        material.varying = self.varying(entry, hypothesis)?;
+        material.varying = if elements.is_empty() {
+            self.varying(entry, hypothesis, &parameters)?
+        } else {
+            let profiles = self.profiles(&self.tables().parameters(entry))?;
+            profiles.into_iter().chain(elements).collect()
+        };
         let law = &material.built.law;
         for (variable, value) in &self.tables().initial(entry) {
             if !value.get_ref().is_finite() {
@@ -113,24 +128,31 @@ impl<'a> LawShelf<'a> {
         Ok(material)
     }
 
-    /// Parameters of a law that vary with the height; every value is held against its bounds.
+    /// Parameters of a law that vary with the height.
+    fn profiles(&self, given: &ParameterTable) -> Result<Vec<(String, Variation)>, Error> {
+        let mut varying = Vec::new();
+        for (id, value) in given {
+            if let ParameterValue::Varying(over) = value.get_ref() {
+                let profile = ProfileInput::Over(over.clone()).read(self.source, value.span())?;
+                varying.push((id.get_ref().clone(), Variation::Height(profile)));
+            }
+        }
+        Ok(varying)
+    }
+
+    /// The same; every value is held against its bounds.
     pub(super) fn varying(
         &self,
         entry: &LawInput,
         hypothesis: Hypothesis,
-    ) -> Result<Vec<(String, Profile)>, Error> {
-        let given = self.tables().parameters(entry);
-        let mut varying = Vec::new();
-        for (id, value) in &given {
-            if let ParameterValue::Varying(over) = value.get_ref() {
-                let profile = ProfileInput::Over(over.clone()).read(self.source, value.span())?;
-                varying.push((id.get_ref().clone(), profile));
-            }
-        }
-        let most = varying
-            .iter()
-            .map(|(_, profile)| profile.points().len())
-            .max();
+        given: &ParameterTable,
+    ) -> Result<Vec<(String, Variation)>, Error> {
+        let varying = self.profiles(given)?;
+        let of_profile = |value: &Spanned<ParameterValue>| match value.get_ref() {
+            ParameterValue::Varying(over) => over.z.len(),
+            _ => 0,
+        };
+        let most = given.values().map(of_profile).max();
         for point in 1..most.unwrap_or(0) {
             let mut parameters = given.clone();
             for value in parameters.values_mut() {
@@ -141,7 +163,7 @@ impl<'a> LawShelf<'a> {
             }
             let loaded = self.loaded(entry)?;
             try_law(&loaded, hypothesis, &parameters)
-                .map_err(|failure| place_failure(self.source, &entry.law, &given, &failure))?;
+                .map_err(|failure| place_failure(self.source, &entry.law, given, &failure))?;
         }
         Ok(varying)
     }

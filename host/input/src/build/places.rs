@@ -79,6 +79,8 @@ impl Case {
             | Item::Rigid(of, _)
             | Item::Time(of)
             | Item::Course(of)
+            | Item::Until(of)
+            | Item::Strain(of, _)
             | Item::UnitWeight(of, _)
             | Item::DrainageOf(of, _)
             | Item::Water(Some(of)) => phase(*of).and_then(|of| place_in_phase(of, item, cause)),
@@ -138,6 +140,8 @@ fn place_in_phase(phase: &PhaseInput, item: &Item, cause: &Cause) -> Option<Rang
         Item::Rigid(_, number) => phase.rigid.get(*number)?.span(),
         Item::Time(_) => phase.time.place()?,
         Item::Course(_) => phase.course.place()?,
+        Item::Until(_) => phase.until.place()?,
+        Item::Strain(_, number) => phase.strain.get_index(*number)?.1.span(),
         Item::UnitWeight(_, number) => phase.unit_weight.get_index(*number)?.1.span(),
         Item::DrainageOf(_, number) => phase.drainage.get_index(*number)?.1.span(),
         Item::Water(_) => phase.water.as_ref()?.get_ref().level.span(),

@@ -1,7 +1,8 @@
 //! Laws of a file that nothing takes: for variants, for other files, for later. No result depends on them, so
 //! what is wrong with one is a warning.
 
-use super::LawShelf;
+use super::followed::Without;
+use super::law_shelf::LawShelf;
 use crate::Error;
 use crate::case::LawInput;
 use crate::material::{given, no_internal_variable, place_failure, try_law};
@@ -33,7 +34,7 @@ impl LawShelf<'_> {
             if is_taken || self.tables().is_filler(entry.get_ref()) {
                 continue;
             }
-            match self.try_spare(entry, look, stands_alone) {
+            match self.try_spare(name, entry, look, stands_alone) {
                 Err(error) if error.is_stop() => return Err(error),
                 Err(error) => said.push(self.words(name, entry, &error)),
                 Ok(()) => {}
@@ -44,12 +45,18 @@ impl LawShelf<'_> {
 
     fn try_spare(
         &self,
+        name: &str,
         entry: &Spanned<LawInput>,
         look: Look,
         stands_alone: bool,
     ) -> Result<(), Error> {
         let entry = entry.get_ref();
-        let parameters = self.tables().parameters(entry);
+        let parameters = match self.valued(name, entry, None) {
+            Ok(parameters) => parameters,
+            Err(Without::Error(error)) => return Err(*error),
+            // No element says what its values are.
+            Err(Without::Place) => return Ok(()),
+        };
         let placed = |failure: BuildFailure| match failure.cause {
             BuildCause::Missing { .. } if !stands_alone => Ok(()),
             _ => Err(place_failure(
@@ -75,7 +82,7 @@ impl LawShelf<'_> {
         // It may be meant for any of them; a law that offers none says why.
         for &hypothesis in offered.iter().chain(&Hypothesis::ALL[..1]) {
             let tried = match try_law(&law, hypothesis, &parameters) {
-                Ok(_) => self.varying(entry, hypothesis).map(drop),
+                Ok(_) => self.varying(entry, hypothesis, &parameters).map(drop),
                 Err(failure) => placed(failure),
             };
             match tried {

@@ -8,6 +8,8 @@ use std::collections::{HashMap, HashSet};
 
 /// Most increments of a phase.
 const MOST_INCREMENTS: usize = 10_000_000;
+/// Largest stress-free strain: small strains are assumed.
+const LARGEST_STRAIN: f64 = 0.1;
 /// Longest time of a phase.
 pub const LONGEST: f64 = 1e20;
 
@@ -39,6 +41,8 @@ pub(super) fn check(problem: &Problem, sides: &[Face]) -> Result<(), Refusal> {
         ground(problem, number, phase)?;
         time(number, phase)?;
         course(problem, number, phase)?;
+        until(number, phase)?;
+        strains(problem, number, phase)?;
         let there = edges_there(&problem.mesh, &active);
         pressures(problem, number, phase, &there, &faces)?;
         forces(problem, number, phase, &there)?;
@@ -54,14 +58,15 @@ fn refuse_no_group(problem: &Problem, number: usize, phase: &Phase) -> Result<()
     let named = phase.materials.iter().map(|(group, _)| group);
     let named = named.chain(&phase.activate).chain(&phase.deactivate);
     let named = named.chain(phase.unit_weight.iter().map(|(group, _)| group));
-    let mut named = named.chain(phase.drainage.iter().map(|(group, _)| group));
+    let named = named.chain(phase.drainage.iter().map(|(group, _)| group));
+    let mut named = named.chain(phase.strain.iter().map(|(group, _)| group));
     match named.find(|&&group| group >= n) {
         Some(&group) => Err(Refusal::new(Item::Phase(number), Cause::NoGroup(group))),
         None => Ok(()),
     }
 }
 
-/// A phase gives a group one material, one weight, one drainage.
+/// A phase gives a group one material, one weight, one drainage, one strain.
 fn given_twice(problem: &Problem, number: usize, phase: &Phase) -> Result<(), Refusal> {
     let second = |groups: Vec<usize>| {
         let mut seen = HashSet::new();
@@ -70,10 +75,12 @@ fn given_twice(problem: &Problem, number: usize, phase: &Phase) -> Result<(), Re
     let materials = phase.materials.iter().map(|(group, _)| *group);
     let weights = phase.unit_weight.iter().map(|(group, _)| *group);
     let drainage = phase.drainage.iter().map(|(group, _)| *group);
-    let lists: [(&'static str, Vec<usize>); 3] = [
+    let strains = phase.strain.iter().map(|(group, _)| *group);
+    let lists: [(&'static str, Vec<usize>); 4] = [
         ("a law", materials.collect()),
         ("a unit weight", weights.collect()),
         ("a drainage", drainage.collect()),
+        ("a strain", strains.collect()),
     ];
     for (what, groups) in lists {
         if let Some(group) = second(groups) {
@@ -210,6 +217,52 @@ fn course(problem: &Problem, number: usize, phase: &Phase) -> Result<(), Refusal
     }
     if problem.settings.control == Control::ArcLength {
         return refuse(Cause::CourseOfArcLength);
+    }
+    Ok(())
+}
+
+/// What ends a phase before its time leaves no change half done that is there or not.
+fn until(number: usize, phase: &Phase) -> Result<(), Refusal> {
+    let Some(until) = &phase.until else {
+        return Ok(());
+    };
+    let refuse = |cause| Err(Refusal::new(Item::Until(number), cause));
+    if !until.reaches.is_finite() {
+        return refuse(Cause::NotFinite("the value that `until` names"));
+    }
+    let changes = [
+        ("unit_weight", !phase.unit_weight.is_empty()),
+        ("water", phase.water_level.is_some()),
+        ("laws", !phase.materials.is_empty()),
+        ("activate", !phase.activate.is_empty()),
+        ("deactivate", !phase.deactivate.is_empty()),
+        ("strain", !phase.strain.is_empty()),
+    ];
+    match changes.into_iter().find(|(_, is_changed)| *is_changed) {
+        Some((key, _)) => refuse(Cause::UntilBeside(key)),
+        None => Ok(()),
+    }
+}
+
+fn strains(problem: &Problem, number: usize, phase: &Phase) -> Result<(), Refusal> {
+    for (place, &(group, strain)) in phase.strain.iter().enumerate() {
+        let refuse = |cause| Err(Refusal::new(Item::Strain(number, place), cause));
+        let group = &problem.groups[group];
+        if group.formulation == Formulation::ZeroThickness {
+            return refuse(Cause::StrainOfInterface(group.name.clone()));
+        }
+        for value in strain {
+            if value.is_nan() || value.abs() > LARGEST_STRAIN {
+                return refuse(Cause::OutOfBounds(
+                    "a strain",
+                    value,
+                    "at most 0.1 either way",
+                ));
+            }
+        }
+        if problem.settings.control == Control::ArcLength {
+            return refuse(Cause::StrainUnderArcLength);
+        }
     }
     Ok(())
 }

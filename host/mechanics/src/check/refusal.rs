@@ -39,6 +39,10 @@ pub enum Item {
     Course(usize),
     /// The time of a phase.
     Time(usize),
+    /// The quantity that may end a phase.
+    Until(usize),
+    /// The strain that a phase gives a group.
+    Strain(usize, usize),
     /// A group that a phase activates or deactivates.
     Activation {
         /// The phase.
@@ -282,6 +286,12 @@ pub enum Cause {
     BadCourse,
     /// A course under arc-length control, which has its own time.
     CourseOfArcLength,
+    /// A phase that may end before its time changes this, which is there at once or not at all.
+    UntilBeside(&'static str),
+    /// An interface without thickness has no strain.
+    StrainOfInterface(String),
+    /// Strains of groups under arc-length control.
+    StrainUnderArcLength,
     /// A phase changes the water of a problem without water.
     NoWater,
     /// Earth pressure at rest that the law cannot carry.

@@ -2,7 +2,7 @@
 
 use super::Columns;
 use crate::mesh::Mesh;
-use crate::problem::{InitialStress, Problem};
+use crate::problem::{Ground, InitialStress, Problem, Water};
 use std::collections::HashMap;
 
 /// A point on an interface is moved this far into the adjacent element, as a fraction of the way to
@@ -10,8 +10,11 @@ use std::collections::HashMap;
 const INSIDE: f64 = 1e-9;
 
 /// The stresses before the first phase, at any point of any group.
-pub(crate) struct InitialStresses<'p> {
-    problem: &'p Problem,
+#[derive(Debug)]
+pub struct InitialStresses<'p> {
+    mesh: &'p Mesh,
+    water: Option<&'p Water>,
+    groups: Vec<Ground>,
     columns: Option<Columns<'p>>,
     /// For every group, its own.
     surcharges: Vec<Option<f64>>,
@@ -20,37 +23,58 @@ pub(crate) struct InitialStresses<'p> {
 }
 
 impl<'p> InitialStresses<'p> {
-    pub(crate) fn new(problem: &'p Problem) -> Self {
-        let groups = &problem.groups;
+    pub(crate) fn of(problem: &'p Problem) -> Self {
+        let groups = problem.groups.iter().map(Ground::from).collect();
+        Self::new(&problem.mesh, problem.water.as_ref(), groups)
+    }
+
+    /// Those of a mesh whose groups, in their order, are this ground.
+    pub fn new(mesh: &'p Mesh, water: Option<&'p Water>, groups: Vec<Ground>) -> Self {
         let is_at_rest =
-            |stress: &Option<InitialStress>| matches!(stress, Some(InitialStress::AtRest(_)));
-        let columns = groups
-            .iter()
-            .any(|group| is_at_rest(&group.initial_stress))
-            .then(|| {
-                Columns::new(&problem.mesh, problem.water.as_ref(), |number| {
-                    let group = &groups[number];
-                    let wet = group.saturated_unit_weight.unwrap_or(group.unit_weight);
-                    group.is_active.then_some([group.unit_weight, wet])
-                })
-            });
-        let surcharge = |stress: &Option<InitialStress>| match stress {
+            |group: &Ground| matches!(group.initial_stress, Some(InitialStress::AtRest(_)));
+        let columns = groups.iter().any(is_at_rest).then(|| {
+            Columns::new(mesh, water, |number| {
+                let group: &Ground = &groups[number];
+                group.is_active.then_some(group.unit_weight)
+            })
+        });
+        let surcharge = |group: &Ground| match &group.initial_stress {
             Some(InitialStress::AtRest(at_rest)) => at_rest.surcharge,
             _ => None,
         };
-        let surcharges = groups.iter().map(|group| surcharge(&group.initial_stress));
         Self {
-            problem,
+            mesh,
+            water,
             columns,
-            surcharges: surcharges.collect(),
-            beside: beside_joints(&problem.mesh),
+            surcharges: groups.iter().map(surcharge).collect(),
+            beside: beside_joints(mesh),
+            groups,
         }
+    }
+
+    /// For every element of a group, in their order, its centre and the effective stress of the ground there,
+    /// components 11 22 33 12, tension positive, kPa: of zero-thickness elements the mean of the sides that have one.
+    /// Zero where there is none.
+    pub fn of_elements(&self, number: usize) -> Vec<([f64; 2], [f64; 4])> {
+        let mesh = self.mesh;
+        let solids = mesh.solids.iter().filter(|solid| solid.group == number);
+        let solids = solids.map(|solid| {
+            let at = mesh.towards_middle(solid, mesh.nodes[solid.nodes()[0]], 1.0);
+            (at, self.at(number, at).unwrap_or_default())
+        });
+        let joints = mesh.joints.iter().filter(|joint| joint.group == number);
+        let joints = joints.map(|joint| {
+            let at = mesh.nodes[joint.minus[2]];
+            let sides = [joint.minus[2], joint.plus[2]];
+            (at, self.mean_of_sides(sides, at, |_| 0.0))
+        });
+        solids.chain(joints).collect()
     }
 
     /// Stress of a solid group at a point, components 11 22 33 12 in global axes, tension positive, kPa.
     /// `None` if the group has no initial stress.
     pub(crate) fn at(&self, number: usize, at: [f64; 2]) -> Option<[f64; 4]> {
-        let group = &self.problem.groups[number];
+        let group = &self.groups[number];
         Some(match group.initial_stress.as_ref()? {
             InitialStress::Constant(stress) => *stress,
             InitialStress::Profiles(profiles) => [0, 1, 2, 3].map(|c| profiles[c].at(at[1])),
@@ -74,8 +98,8 @@ impl<'p> InitialStresses<'p> {
             columns.nearest_above(at, |group| self.surcharges[group])
         };
         let surcharge = own.or_else(from_above);
-        let has_water = self.problem.groups[number].pore_water;
-        let water = self.problem.water.as_ref().filter(|_| has_water);
+        let has_water = self.groups[number].pore_water;
+        let water = self.water.filter(|_| has_water);
         [
             columns.map_or(0.0, |columns| columns.above(at)) + surcharge.unwrap_or(0.0),
             water.map_or(0.0, |water| water.pressure(at)),
@@ -85,19 +109,29 @@ impl<'p> InitialStresses<'p> {
     /// Stress of the ground around a joint of group `number` at a point of it: the mean of the sides that have one. It
     /// is effective if there is water between the faces, else total. `faces`: the nodes in the middle of its two faces.
     pub(crate) fn beside(&self, number: usize, faces: [usize; 2], at: [f64; 2]) -> [f64; 4] {
-        let mesh = &self.problem.mesh;
-        let has_water = |group: usize| self.problem.groups[group].pore_water;
-        let water = self.problem.water.as_ref();
-        let pressure = water.map_or(0.0, |water| water.pressure(at));
-        let of_side = |face: &usize| {
-            let solid = &mesh.solids[*self.beside.get(face)?];
-            let inside = mesh.towards_middle(solid, at, INSIDE);
-            let mut stress = self.at(solid.group, inside)?;
-            let excess = match (has_water(solid.group), has_water(number)) {
+        let has_water = |group: usize| self.groups[group].pore_water;
+        let pressure = self.water.map_or(0.0, |water| water.pressure(at));
+        self.mean_of_sides(faces, at, |side| {
+            match (has_water(side), has_water(number)) {
                 (true, false) => -pressure,
                 (false, true) => pressure,
-                _ => return Some(stress),
-            };
+                _ => 0.0,
+            }
+        })
+    }
+
+    /// Mean of the stresses on those sides of a joint that have one, each with a normal stress added by its group.
+    fn mean_of_sides(
+        &self,
+        faces: [usize; 2],
+        at: [f64; 2],
+        excess: impl Fn(usize) -> f64,
+    ) -> [f64; 4] {
+        let of_side = |face: &usize| {
+            let solid = &self.mesh.solids[*self.beside.get(face)?];
+            let inside = self.mesh.towards_middle(solid, at, INSIDE);
+            let mut stress = self.at(solid.group, inside)?;
+            let excess = excess(solid.group);
             stress[..3].iter_mut().for_each(|normal| *normal += excess);
             Some(stress)
         };

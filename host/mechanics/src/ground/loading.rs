@@ -16,6 +16,8 @@ pub struct Loading {
     pub force: BTreeMap<String, [f64; 2]>,
     /// Unit weights of every group above and below the water, kN/m³.
     pub unit_weight: Vec<[f64; 2]>,
+    /// Stress-free strains of every group since the start, components 11 22 33.
+    pub strain: Vec<[f64; 3]>,
     /// Water table.
     pub water_level: Option<Profile>,
     /// For every group, whether it is active.
@@ -33,6 +35,7 @@ impl Loading {
         };
         Self {
             unit_weight: problem.groups.iter().map(weight).collect(),
+            strain: vec![[0.0; 3]; problem.groups.len()],
             water_level: problem.water.as_ref().map(|water| water.level.clone()),
             active: problem.active_after(0),
             ..Self::default()
@@ -46,6 +49,9 @@ impl Loading {
         phase.switch(&mut changed.active);
         for &(group, weight) in &phase.unit_weight {
             changed.unit_weight[group] = [weight; 2];
+        }
+        for &(group, strain) in &phase.strain {
+            changed.strain[group] = strain;
         }
         if let (Some(level), Some(_)) = (&phase.water_level, &changed.water_level) {
             changed.water_level = Some(level.clone());
@@ -82,11 +88,15 @@ impl Loading {
             (line.clone(), [0, 1].map(|c| between(start[c], end[c])))
         };
         let weights = self.unit_weight.iter().zip(&other.unit_weight);
+        let strains = self.strain.iter().zip(&other.strain);
         Self {
             pressure: other.pressure.iter().map(pressure).collect(),
             force: other.force.iter().map(force).collect(),
             unit_weight: weights
                 .map(|(a, b)| [0, 1].map(|c| between(a[c], b[c])))
+                .collect(),
+            strain: strains
+                .map(|(a, b)| [0, 1, 2].map(|c| between(a[c], b[c])))
                 .collect(),
             water_level: match (&self.water_level, &other.water_level) {
                 (Some(a), Some(b)) if a != b => Some(a.towards(b, part)),

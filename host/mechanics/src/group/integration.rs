@@ -4,6 +4,7 @@ mod depth_profile;
 mod difference_tangents;
 mod law_start;
 mod pore_water;
+mod swelling;
 mod tangents;
 mod thin_layer;
 mod traction_projection;
@@ -12,6 +13,7 @@ pub(super) use depth_profile::Varying;
 pub use difference_tangents::{Origin, Reason as MadeBy};
 pub use law_start::LawStart;
 pub(super) use pore_water::Pores;
+pub(super) use swelling::Swelling;
 pub(super) use tangents::PointTangents;
 pub(super) use thin_layer::Layer;
 
@@ -118,6 +120,7 @@ impl Group {
         copy(&self.strain.committed, &mut self.strain.trial);
         self.kinematics
             .add_gradients(increment, &mut self.strain.trial);
+        self.swell(time_increment);
         self.follow_pores(time, time_increment);
         if self.tangents.are_constant {
             self.evaluate_linear();

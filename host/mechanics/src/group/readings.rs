@@ -61,13 +61,14 @@ impl Group {
         })
     }
 
-    /// Strain of a point in global axes (committed), γ = 2ε; `None` for zero-thickness elements.
+    /// Strain of a point in global axes (committed), stress-free strain included, γ = 2ε; `None` for zero-thickness elements.
     pub fn global_strain(&self, point: usize) -> Option<[f64; 4]> {
         let e = self.strain.committed.get(4 * point..4 * point + 4)?;
         let axes = self.kinematics.axes(self.kinematics.place_of(point).0);
         (self.kinematics.n_components() == 4).then(|| {
             let [e_11, e_22, e_33, e_12] = axes.stress_to_global([e[0], e[1], e[2], e[3] / 2.0]);
-            [e_11, e_22, e_33, 2.0 * e_12]
+            let [f_11, f_22, f_33] = self.stress_free_strain();
+            [e_11 + f_11, e_22 + f_22, e_33 + f_33, 2.0 * e_12]
         })
     }
 

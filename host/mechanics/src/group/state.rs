@@ -94,6 +94,8 @@ pub struct GroupState<'g> {
     /// Tangents, where a matrix made of them is still in use.
     tangent: Option<Cow<'g, [f64]>>,
     pores: Option<Cow<'g, Pores>>,
+    /// Stress-free strain.
+    swelling: Option<Cow<'g, [f64]>>,
     origin: Origin,
     bond: Bond,
 }
@@ -112,6 +114,7 @@ impl GroupState<'_> {
             law_calls: Cow::Owned(self.law_calls.into_owned()),
             tangent: self.tangent.map(|tangent| Cow::Owned(tangent.into_owned())),
             pores: self.pores.map(|pores| Cow::Owned(pores.into_owned())),
+            swelling: self.swelling.map(|strain| Cow::Owned(strain.into_owned())),
             origin: self.origin,
             bond: self.bond,
         }
@@ -133,6 +136,7 @@ impl Group {
             law_calls: (&self.law_calls).into(),
             tangent: with_tangents.then(|| (&self.tangents.values).into()),
             pores: self.pores.as_ref().map(Cow::Borrowed),
+            swelling: self.swelling.as_ref().map(|s| (&s.strain.committed).into()),
             origin: self.tangents.origin,
             bond: self.bond,
         }
@@ -156,12 +160,15 @@ impl Group {
         let law = law.cloned().ok_or_else(wrong)?;
         let n_internal = self.kinematics.n_points() * law.built.law.n_states();
         let (jump, stiffness) = self.of_layer();
+        let swelling = self.swelling.as_ref();
+        let swelling = swelling.map(|swelling| swelling.strain.committed.len());
         if state.strain.len() != self.strain.committed.len()
             || state.stress.len() != self.stress.committed.len()
             || !(state.correction.is_empty() || state.correction.len() == state.stress.len())
             || state.internal.len() != n_internal
             || state.jump.len() != jump.len()
             || state.stiffness.len() != stiffness.len()
+            || state.swelling.as_ref().map(|strain| strain.len()) != swelling
         {
             return Err(wrong());
         }
@@ -178,6 +185,9 @@ impl Group {
         self.stress = Field::new(state.stress.into_owned());
         self.correction = state.correction.into_owned();
         self.pores = state.pores.map(Cow::into_owned);
+        if let (Some(own), Some(strain)) = (&mut self.swelling, state.swelling) {
+            own.strain = Field::new(strain.into_owned());
+        }
         self.start_law(law, Some(state.internal.to_vec()))
             .map_err(|failure| failure.to_string())?;
         // Initial values that the case file gives held at the start of the law only.
@@ -210,7 +220,8 @@ impl Group {
         let jump = self.layer.as_ref().map(|layer| &layer.jump);
         let excess = self.pores.as_ref().map(|pores| &pores.excess);
         let own = [&self.strain, &self.stress, &self.internal];
-        let fields = own.into_iter().chain(jump).chain(excess);
+        let swelling = self.swelling.as_ref().map(|swelling| &swelling.strain);
+        let fields = own.into_iter().chain(jump).chain(excess).chain(swelling);
         Committed(fields.map(|field| field.committed.clone()).collect())
     }
 
@@ -231,7 +242,8 @@ impl Group {
         let jump = self.layer.as_mut().map(|layer| &mut layer.jump);
         let excess = self.pores.as_mut().map(|pores| &mut pores.excess);
         let others = [&mut self.strain, &mut self.stress, &mut self.internal];
-        others.into_iter().chain(jump).chain(excess)
+        let swelling = self.swelling.as_mut().map(|swelling| &mut swelling.strain);
+        others.into_iter().chain(jump).chain(excess).chain(swelling)
     }
 
     /// What the group keeps for its points. A trial state as large comes and goes.

@@ -1,5 +1,6 @@
 //! What makes ground of elements: stress at rest, water, drainage.
 
+use super::ElementGroup;
 use serde::{Deserialize, Serialize};
 
 /// A value over the height y (z): linear between points, constant beyond.
@@ -122,6 +123,31 @@ impl Ratio {
                 let k_0nc = 1.0 - friction_angle.at(y).to_radians().sin();
                 k_0nc * (ocr * vertical + pop) - nu / (1.0 - nu) * ((ocr - 1.0) * vertical + pop)
             }
+        }
+    }
+}
+
+/// What a group is as ground before the first phase.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ground {
+    /// Effective stress.
+    pub initial_stress: Option<InitialStress>,
+    /// Unit weights above and below the water, kN/m³.
+    pub unit_weight: [f64; 2],
+    /// Water fills its pores below the water table.
+    pub pore_water: bool,
+    /// It is there.
+    pub is_active: bool,
+}
+
+impl From<&ElementGroup> for Ground {
+    fn from(group: &ElementGroup) -> Self {
+        let dry = group.unit_weight;
+        Self {
+            initial_stress: group.initial_stress.clone(),
+            unit_weight: [dry, group.saturated_unit_weight.unwrap_or(dry)],
+            pore_water: group.pore_water,
+            is_active: group.is_active,
         }
     }
 }

@@ -2,6 +2,7 @@
 //! increments.
 
 use super::steps::{EASY, Progress};
+use super::until::Verdict;
 use super::{Simulation, UnderWay, Warning, Watch, When, go_on, stopped};
 use crate::equilibrium::{Guess, Measure, Newton, Reason, StepFailure, StepSuccess};
 use crate::error::{Error, Place};
@@ -63,6 +64,7 @@ impl Simulation {
         };
         for _ in 0..MAX_STEPS {
             let from = phase.course.lambda;
+            let before = self.before_step(phase);
             let mut step = self.advance(phase, course.distance);
             if let Ok((beyond, lambda)) = &step
                 && *lambda >= target
@@ -97,6 +99,14 @@ impl Simulation {
                     let is_easy = success.iterations.len() as f64 <= EASY * most;
                     self.take_over(success, lambda, place, phase, watch, done)?;
                     phase.record.arc_length += 1;
+                    match self.look_after_step(place, phase, before, watch)? {
+                        Verdict::GoesOn => {}
+                        Verdict::Ends => return Ok(PathEnd::Reached),
+                        Verdict::Again(part) => {
+                            course.distance *= part;
+                            continue;
+                        }
+                    }
                     course.steps += 1;
                     if lambda >= target {
                         // Not so short that the next increment starts with next to nothing.

@@ -7,7 +7,7 @@ use super::state::PhaseCourse;
 use super::ties::Tied;
 use super::{Simulation, Warning, Watch};
 use crate::assembly::fold;
-use crate::equilibrium::Loads;
+use crate::equilibrium::{Loads, norm};
 use crate::error::Error;
 use crate::ground::{Acting, Loading};
 use crate::problem::{Axis, Phase};
@@ -130,6 +130,36 @@ impl Simulation {
         loads
     }
 
+    /// Tells the groups how fast their stress-free strains change on a leg of a phase.
+    pub(super) fn set_swelling(&mut self, number: usize, course: usize) {
+        let leg = leg(&self.problem.phases[number], course);
+        let [[t_0, f_0], [t_1, f_1]] = leg.unwrap_or([[0.0, 0.0], [1.0, 1.0]]);
+        let speed = (f_1 - f_0) / (t_1 - t_0);
+        let [start, end] = &self.loading;
+        let changes = start.strain.iter().zip(&end.strain);
+        for (group, (start, end)) in self.groups.iter_mut().zip(changes) {
+            group.swells_by([0, 1, 2].map(|c| speed * (end[c] - start[c])));
+        }
+    }
+
+    /// Counts stress-free strains of a phase among the forces in play, with what they would call forth if they were
+    /// held: where nothing holds them, only round-off is left of these forces.
+    pub(super) fn count_swelling(&mut self) {
+        let mut force = vec![0.0; self.displacement.len()];
+        let [start, end] = &self.loading;
+        let strains = start.strain.iter().zip(&end.strain);
+        for (group, (start, end)) in self.groups.iter().zip(strains) {
+            if group.is_active {
+                let larger = |c: usize| start[c].abs().max(end[c].abs());
+                group.add_held([0, 1, 2].map(larger), &mut force);
+            }
+        }
+        self.largest_force = self.largest_force.max(norm(&force));
+        for (largest, force) in self.largest_forces.iter_mut().zip(force) {
+            *largest = largest.max(force.abs());
+        }
+    }
+
     /// Loads when the phase has changed its loads by this factor.
     pub(super) fn loading_at(&self, factor: f64) -> Loading {
         let [start, end] = &self.loading;
@@ -141,11 +171,12 @@ impl Simulation {
     }
 
     /// Goes on to the next leg of a phase, if there is one.
-    pub(super) fn next_leg(&self, number: usize, course: &mut PhaseCourse) -> bool {
+    pub(super) fn next_leg(&mut self, number: usize, course: &mut PhaseCourse) -> bool {
         if leg(&self.problem.phases[number], course.leg + 1).is_none() {
             return false;
         }
         course.leg += 1;
+        self.set_swelling(number, course.leg);
         let next = self.loads_on(number, course.leg, &course.prescribed);
         let last = std::mem::take(&mut course.loads);
         course.loads = Loads {
@@ -175,12 +206,16 @@ impl Simulation {
     }
 
     /// Takes note of what a phase ends with.
-    pub(super) fn keep_loads(&mut self, number: usize, prescribed: &[Prescribed]) {
-        let course = &self.problem.phases[number].course;
-        let Some(&[_, factor]) = course.last() else {
-            return;
+    pub(super) fn keep_loads(&mut self, number: usize, course: &PhaseCourse) {
+        let phase = &self.problem.phases[number];
+        let factor = match (phase.course.last(), leg(phase, course.leg)) {
+            (_, Some([[t_0, f_0], [t_1, f_1]])) if course.is_over => {
+                f_0 + (course.lambda - t_0) / (t_1 - t_0) * (f_1 - f_0)
+            }
+            (Some(&[_, factor]), _) => factor,
+            (None, _) => return,
         };
-        for &(dof, start, end) in prescribed {
+        for &(dof, start, end) in &course.prescribed {
             if let Some(value) = self.prescribed.get_mut(&dof) {
                 *value = part(factor, start, end);
             }

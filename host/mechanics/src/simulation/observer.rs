@@ -1,7 +1,7 @@
 //! How others follow a simulation: results, progress, checkpoints, requests to stop.
 
 use super::warning::Warning;
-use super::{PhaseRecord, Snapshot, State};
+use super::{PhaseRecord, Reached, Snapshot, State};
 use crate::equilibrium::{Iteration, Reason};
 use crate::error::Place;
 use crate::group::Group;
@@ -110,6 +110,14 @@ pub trait Watch {
     /// The ground was found at rest but for this share of its weight, which the first phase carries to
     /// equilibrium.
     fn at_rest(&mut self, _phase: &str, _share: f64) {}
+
+    /// The value of a quantity that may end a phase; `None` where it is not there, or not known.
+    fn quantity(&mut self, _name: &str, _state: &Snapshot<'_>) -> Option<f64> {
+        None
+    }
+
+    /// A phase ends before its time, since its quantity has reached its value.
+    fn reached(&mut self, _end: &Reached) {}
 
     /// A phase has ended, or cannot go on.
     fn phase_ends(&mut self, _record: PhaseRecord) {}

@@ -86,6 +86,8 @@ impl Simulation {
         let prescribed = self.start(number, watch)?;
         let offsets = self.offsets();
         let loads = self.loads_on(number, 0, &prescribed);
+        self.set_swelling(number, 0);
+        self.count_swelling();
         let (equations, loads) = self.equations_of(number, loads, None)?;
         let imbalance = equations.out_of_balance;
         let weight = crate::equilibrium::norm(&loads.force_start);
@@ -117,8 +119,12 @@ impl Simulation {
             leg: 0,
             prescribed,
             offsets,
+            measured: None,
+            taken_back: 0,
+            is_over: false,
         };
         self.enter(number, equations, course, watch);
+        self.look_at_start(watch);
         Ok(())
     }
 
@@ -141,6 +147,7 @@ impl Simulation {
     /// Takes up a phase where it stands.
     pub(super) fn resume_phase(&mut self, number: usize, course: PhaseCourse) -> Result<(), Error> {
         let loads = course.loads.clone();
+        self.set_swelling(number, course.leg);
         let (equations, _) = self.equations_of(number, loads, Some(&course))?;
         self.enter(number, equations, course, &mut ());
         Ok(())
@@ -178,8 +185,14 @@ impl Simulation {
 
     /// Ends a phase, be it as it may.
     pub(super) fn end_phase(&mut self, phase: &UnderWay, watch: &mut dyn Watch) {
-        self.keep_loads(phase.number, &phase.course.prescribed);
-        self.time += self.problem.phases[phase.number].length();
+        self.tell_end(phase, watch);
+        self.keep_loads(phase.number, &phase.course);
+        let length = self.problem.phases[phase.number].length();
+        self.time += if phase.course.is_over {
+            phase.course.lambda * length
+        } else {
+            length
+        };
         self.done = phase.number + 1;
         self.report_phase(phase, watch);
     }

@@ -1,12 +1,13 @@
 //! All that a simulation needs to go on from a whole increment as if it had never stopped.
 
 use super::loads::Prescribed;
-use super::{History, PhaseRecord, Simulation};
+use super::{History, PhaseRecord, Simulation, UnderWay};
 use crate::equilibrium::{Loads, Standing};
 use crate::error::Error;
 use crate::ground::Loading;
 use crate::group::{Group, GroupState};
 use crate::problem::Material;
+use crate::settings::Method;
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -61,6 +62,12 @@ pub(super) struct PhaseCourse {
     pub(super) prescribed: Vec<Prescribed>,
     /// Difference between tied displacements and those that they follow.
     pub(super) offsets: Vec<f64>,
+    /// The quantity that may end the phase, at its start and now, where it is there.
+    pub(super) measured: Option<[f64; 2]>,
+    /// Steps taken back for its sake.
+    pub(super) taken_back: usize,
+    /// It has ended the phase.
+    pub(super) is_over: bool,
 }
 
 impl State<'_> {
@@ -73,6 +80,18 @@ impl State<'_> {
     /// whole ones: the state is the last one in equilibrium.
     pub fn part_of_phase(&self) -> f64 {
         self.course.lambda
+    }
+
+    /// Steps taken back for the sake of the quantity that may end the phase.
+    pub(super) fn taken_back(&self) -> usize {
+        self.course.taken_back
+    }
+
+    /// One more, with what the phase has cost.
+    pub(super) fn take_back_again(&mut self, record: PhaseRecord) {
+        let course = self.course.to_mut();
+        course.taken_back += 1;
+        course.record = record;
     }
 
     /// A copy that borrows nothing from the simulation.
@@ -97,6 +116,17 @@ impl State<'_> {
     }
 }
 
+impl UnderWay {
+    /// Completes what its course says of its equations.
+    pub(super) fn note_course(&mut self, method: Method) {
+        let (equations, course) = (&self.equations, &mut self.course);
+        course.domain = equations.domain.as_ref().map(|d| d.standing().clone());
+        course.has_matrix = equations.matrix.is_kept(method);
+        course.largest = equations.matrix.largest();
+        course.record = equations.counted_in(&self.record);
+    }
+}
+
 impl Simulation {
     /// The present state, from the end of the first increment on: after the last whole increment, or the last one in
     /// equilibrium on the way through one that could not be finished. `None` before.
@@ -111,11 +141,7 @@ impl Simulation {
     pub(super) fn note_course(&mut self) {
         let method = self.settings().method;
         if let Some(phase) = &mut self.under_way {
-            let (equations, course) = (&phase.equations, &mut phase.course);
-            course.domain = equations.domain.as_ref().map(|d| d.standing().clone());
-            course.has_matrix = equations.matrix.is_kept(method);
-            course.largest = equations.matrix.largest();
-            course.record = equations.counted_in(&phase.record);
+            phase.note_course(method);
         }
     }
 
@@ -129,8 +155,13 @@ impl Simulation {
     /// The state, after [`Self::note_course`].
     pub(super) fn borrowed_state(&self) -> Option<State<'_>> {
         let phase = self.under_way.as_ref().filter(|p| p.course.increment > 0)?;
+        Some(self.state_in(phase))
+    }
+
+    /// The state in a phase whose course is complete.
+    pub(super) fn state_in<'s>(&'s self, phase: &'s UnderWay) -> State<'s> {
         let has_matrix = phase.course.has_matrix;
-        Some(State {
+        State {
             phase: phase.number,
             groups: self.groups.iter().map(|g| g.state(has_matrix)).collect(),
             displacement: (&self.displacement).into(),
@@ -142,7 +173,7 @@ impl Simulation {
             largest_force: self.largest_force,
             largest_forces: (&self.largest_forces).into(),
             course: Cow::Borrowed(&phase.course),
-        })
+        }
     }
 
     /// Goes back, or on, to a state of a simulation of the same problem.

@@ -3,6 +3,7 @@
 
 use super::arc_length::PathEnd;
 use super::continuation::{self, Lead};
+use super::until::Verdict;
 use super::{Simulation, UnderWay, Warning, Watch, go_on, stopped};
 use crate::equilibrium::{Guess, Newton, StepFailure, StepSuccess};
 use crate::error::{Error, Place};
@@ -82,15 +83,22 @@ impl Simulation {
             was_cut: false,
             done: Progress::default(),
         };
-        while phase.course.lambda < way.target {
+        while phase.course.lambda < way.target && !phase.course.is_over {
             if phase.course.lambda >= phase.course.loads.leg[1] {
                 self.turn(place, phase)?;
             }
             let step = way.next(phase);
+            let before = self.before_step(phase);
             let guess = phase.course.history.guess(step[1] - step[0]);
             let attempt = self.attempt(phase, (way.lead.control, way.lead.singly), step, guess);
             match self.without_leap(attempt, phase, step[1] - step[0]) {
-                Ok(success) => self.go_forward(success, step, &mut way, phase, watch)?,
+                Ok(success) => {
+                    self.go_forward(success, step, &mut way, phase, watch)?;
+                    let verdict = self.look_after_step(place, phase, before, watch)?;
+                    if let Verdict::Again(part) = verdict {
+                        phase.course.step = part * (step[1] - step[0]);
+                    }
+                }
                 Err(failure) => self.go_otherwise(failure, step, &mut way, phase, watch)?,
             }
         }

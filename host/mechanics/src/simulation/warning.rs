@@ -4,6 +4,7 @@ use super::Neighbour;
 use crate::equilibrium::Open;
 use crate::error::Place;
 use crate::group::{BrokenBond, GroupSplit, LawStart, Notice};
+use crate::problem::Until;
 use law::TimeDependence;
 use std::fmt;
 
@@ -33,6 +34,15 @@ pub enum Warning {
         law: String,
         /// Why it does.
         by: TimeDependence,
+    },
+    /// The quantity that may end a phase has not reached its value, but this.
+    NotReached {
+        /// The phase.
+        phase: String,
+        /// What was asked for.
+        until: Until,
+        /// The last value; NaN where there is none.
+        value: f64,
     },
     /// The tolerance of the residual is below round-off.
     RoundOff {
@@ -168,6 +178,21 @@ impl fmt::Display for Warning {
                 f,
                 "phase `{phase}` has no `time`, and law `{law}`{by} depends on time: the phase takes 1 unit of time"
             ),
+            Self::NotReached {
+                phase,
+                until: Until { quantity, reaches },
+                value,
+            } => {
+                write!(
+                    f,
+                    "phase `{phase}`: `{quantity}` has not reached {reaches}, and the phase has come to its end"
+                )?;
+                if value.is_nan() {
+                    Ok(())
+                } else {
+                    write!(f, ": it is {value:.6}")
+                }
+            }
             Self::RoundOff {
                 phase,
                 tolerance,

@@ -10,7 +10,7 @@ use mechanics::check::Cause;
 use mechanics::mesh::{Along, Solid};
 use mechanics::problem::{
     Analysis, AtRest, Axis, Displacement, Drainage, ElementGroup, Force, Formulation, Free,
-    InitialStress, Phase, Pressure, Profile, Ratio, Support, Water,
+    InitialStress, Phase, Pressure, Profile, Ratio, Support, Variation, Water,
 };
 use mechanics::{Error, Material, Mesh, Problem, Simulation};
 
@@ -433,7 +433,8 @@ fn a_stiffness_that_grows_with_depth_is_that_of_each_element() {
         let mut problem = Problem::new(analysis, mesh);
         let mut ground = elastic(analysis, E, 0.0);
         let profile = Profile::new(vec![[0.0, 3e4], [4.0, 1e4]]).unwrap();
-        ground.varying = vec![("young_modulus".to_owned(), profile.clone())];
+        let variation = Variation::Height(profile.clone());
+        ground.varying = vec![("young_modulus".to_owned(), variation)];
         problem.groups = vec![solid("ground", ground)];
         problem.supports = roller_box();
         let mut load = Phase::new("load", 1);

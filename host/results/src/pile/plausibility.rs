@@ -3,15 +3,13 @@
 use super::geometry::{SAME, sides};
 use super::{Base, Pile};
 use mechanics::problem::{Analysis, Axis, Formulation, Phase};
-use mechanics::{NoEquilibrium, Problem, Simulation};
+use mechanics::{Problem, Simulation};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// Thickness, in diameters, of the layer of ground that is as stiff as an interface: above the first the interface is
 /// soft, below the second its jumps are lost in round-off.
 const SOFT: f64 = 1.0;
 const STIFF: f64 = 1e-8;
-/// A force above this multiple of the load carried was probably typed in another unit.
-const MANY: f64 = 20.0;
 
 impl Pile {
     /// Warnings about the pile before it is loaded.
@@ -212,64 +210,6 @@ impl Pile {
             "[pile]: phase `{}` pulls the head upward ({up}), and no phase pushes it down: an uplift test. Forces and \
              displacements that push a pile down are negative in z",
             phase.name
-        ))
-    }
-
-    /// At which load of the head a phase of forces found no further equilibrium, in one sentence. `None` unless the
-    /// phase changes a force on the head along a straight ramp.
-    pub(crate) fn plunge(&self, problem: &Problem, none: &NoEquilibrium) -> Option<String> {
-        let number = problem
-            .phases
-            .iter()
-            .position(|phase| phase.name == none.place.phase)?;
-        let on_head = |phase: &Phase| {
-            let mut own = phase
-                .force
-                .iter()
-                .filter(|force| force.line == self.parts.head);
-            own.find_map(|force| force.y)
-        };
-        let phase = &problem.phases[number];
-        let end = on_head(phase).filter(|_| phase.course.is_empty())?;
-        let start = problem.phases[..number]
-            .iter()
-            .rev()
-            .find_map(on_head)
-            .unwrap_or(0.0);
-        let carried = start + none.reached / none.of as f64 * (end - start);
-        let unit = self.geometry.analysis.force_unit();
-        let (way, of) = if end < start {
-            ("plunges at a head load", [-carried, -end])
-        } else if end > 0.0 {
-            ("is pulled out at an uplift", [carried, end])
-        } else {
-            ("has no equilibrium below a head load", [-carried, -end])
-        };
-        let part = none.failure.mechanism.as_ref().map(|mechanism| {
-            let is_of = |number: usize| problem.groups[number].name == mechanism.at.group;
-            let part = if self.parts.shaft.iter().any(|&group| is_of(group)) {
-                "at the shaft "
-            } else if matches!(self.parts.base, Base::Group(group) if is_of(group)) {
-                "at the base "
-            } else {
-                ""
-            };
-            format!(": {part}{}", mechanism.how)
-        });
-        let unlike = if (carried - start).abs() < 0.05 * (end - start).abs()
-            && end.abs() > MANY * carried.abs()
-        {
-            format!("Forces are in {unit}: was it typed in N?")
-        } else {
-            "To follow it further, prescribe a `displacement` of the head instead of a `force`"
-                .to_owned()
-        };
-        Some(format!(
-            "pile: {way} of {:.1} {unit}, where phase `{}` asks for {:.1}{}. {unlike}",
-            of[0],
-            phase.name,
-            of[1],
-            part.unwrap_or_default()
         ))
     }
 

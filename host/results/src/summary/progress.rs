@@ -3,14 +3,16 @@
 use crate::mesh_error::OfPhase;
 use crate::output_request::{self, OutputRequest};
 use crate::summary::{
-    self, CaseFile, Ending, Figure, Group, Head, Law, LawCalls, LeftOpen, Measured, Mesh, MeshFile,
-    Named, Parameter, Phase, PhaseSeconds, Seconds, ShearZone, Stop, Summary, Variable,
+    self, CaseFile, Ending, Expression, Figure, Group, Head, Law, LawCalls, LeftOpen, Measured,
+    Mesh, MeshFile, Named, Parameter, Phase, PhaseSeconds, Seconds, ShearZone, Stop, Summary,
+    Variable,
 };
 use indexmap::IndexMap;
 use law::BuiltLaw;
 use mechanics::group::Group as GroupOfModel;
+use mechanics::problem::Variation;
 use mechanics::simulation::{Increment, Neighbour, PhaseRecord};
-use mechanics::{Place, Settings, Simulation};
+use mechanics::{Material, Place, Settings, Simulation};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::sync::Arc;
@@ -40,6 +42,8 @@ pub struct About {
     pub laws_of_groups: Vec<LawsOfGroup>,
     /// All laws used, by name and hypothesis.
     pub laws: IndexMap<(String, &'static str), Arc<BuiltLaw>>,
+    /// Parameters that follow from others: name of the law, parameter, expression.
+    pub expressions: Vec<[String; 3]>,
     /// Units of the probes, where factors leave no doubt.
     pub probe_units: Vec<(String, Option<String>)>,
     /// Settings that a study has chosen.
@@ -267,7 +271,8 @@ fn head(about: &About, wanted: &OutputRequest, simulation: &Simulation) -> Head 
         text: text.clone(),
     };
     let laws = about.laws.iter().map(|((name, hypothesis), built)| {
-        let law = law(built, initial(simulation, name, built));
+        let mut law = law(built, initial(simulation, name, built));
+        law.expressions = expressions(simulation, about, name, built);
         (format!("{name} ({hypothesis})"), law)
     });
     let pictures = wanted.figures.iter();
@@ -389,6 +394,47 @@ fn initial(simulation: &Simulation, name: &str, built: &BuiltLaw) -> Named<f64> 
         .collect()
 }
 
+/// Parameters of a law that follow from others, with their smallest and largest values in all groups.
+fn expressions(
+    simulation: &Simulation,
+    about: &About,
+    name: &str,
+    built: &BuiltLaw,
+) -> Named<Expression> {
+    let problem = simulation.problem();
+    let of_phases = problem.phases.iter().flat_map(|phase| &phase.materials);
+    let of_phases = of_phases.map(|(_, material)| material);
+    let materials = problem.groups.iter().map(|group| &group.material);
+    let materials: Vec<&Material> = materials
+        .chain(of_phases)
+        .filter(|material| material.name == name && std::ptr::eq(material.built.as_ref(), built))
+        .collect();
+    let own = about.expressions.iter().filter(|[law, ..]| law == name);
+    let range = |id: &str| {
+        let used = built.parameters.iter().filter(|used| used.id == id);
+        let used = used.map(|used| used.value);
+        let varying = materials.iter().flat_map(|material| &material.varying);
+        let varying = varying.filter(|(of, _)| of == id);
+        let elements = varying.flat_map(|(_, variation)| match variation {
+            Variation::Elements(values) => values.as_slice(),
+            Variation::Height(_) => &[],
+        });
+        let ends = [f64::INFINITY, f64::NEG_INFINITY];
+        used.chain(elements.copied())
+            .fold(ends, |[low, high], value| [low.min(value), high.max(value)])
+    };
+    own.map(|[_, id, expression]| {
+        let [smallest, largest] = range(id);
+        let expression = Expression {
+            expression: expression.clone(),
+            smallest,
+            largest,
+        };
+        (id.clone(), expression)
+    })
+    .collect()
+}
+
 fn law(built: &BuiltLaw, initial: Named<f64>) -> Law {
     let description = built.law.description();
     let library = built.law.library();
@@ -434,6 +480,7 @@ fn law(built: &BuiltLaw, initial: Named<f64>) -> Law {
             lateral_ratio: Some(zone.lateral_ratio),
         }),
         initial,
+        expressions: Named::new(),
     }
 }
 

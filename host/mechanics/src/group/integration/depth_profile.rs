@@ -1,7 +1,7 @@
-//! Parameters that vary with the height: each element has its own law.
+//! Parameters that vary from element to element: each has its own law.
 
 use crate::element::Kinematics;
-use crate::problem::Material;
+use crate::problem::{Material, Variation};
 use law::{BuildFailure, BuiltLaw, Value};
 use std::collections::HashMap;
 use std::ops::Range;
@@ -37,7 +37,11 @@ impl Varying {
             let values = material
                 .varying
                 .iter()
-                .map(|(_, profile)| profile.at(height));
+                .map(|(_, variation)| match variation {
+                    Variation::Height(profile) => profile.at(height),
+                    // The law refuses what is no number.
+                    Variation::Elements(values) => values.get(element).copied().unwrap_or(f64::NAN),
+                });
             let values: Vec<f64> = values.collect();
             let key = values.iter().map(|value| value.to_bits()).collect();
             let number = if let Some(&number) = known.get(&key) {

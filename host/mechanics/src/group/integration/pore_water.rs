@@ -100,6 +100,7 @@ impl Group {
 
     /// Excess pressures of the trial state: (1), or what draining leaves of them.
     pub(in crate::group) fn follow_pores(&mut self, time: f64, time_increment: f64) {
+        let swollen = self.swollen();
         let Some(pores) = &mut self.pores else {
             return;
         };
@@ -111,7 +112,7 @@ impl Group {
             let volume = |e: &[f64]| e[0] + e[1] + e[2];
             let points = trial.iter_mut().zip(&*committed).zip(&pores.stiffness);
             for (((u, u_0), k), (strain, strain_0)) in points.zip(strains) {
-                *u = u_0 - k * (volume(strain) - volume(strain_0));
+                *u = u_0 - k * (volume(strain) - volume(strain_0) + swollen);
             }
         } else {
             let since = (time - self.moment.step_start) / self.moment.step_length;

@@ -1,0 +1,119 @@
+//! What is said of a pile that finds no further equilibrium.
+
+use super::{Base, Pile};
+use mechanics::equilibrium::Mechanism;
+use mechanics::group::FailureMode;
+use mechanics::problem::Phase;
+use mechanics::{NoEquilibrium, Problem, Simulation};
+
+/// A force above this multiple of the load carried was probably typed in another unit.
+const MANY: f64 = 20.0;
+
+impl Pile {
+    /// At which net load of the head a phase of forces found no further equilibrium, what gives way and what to do, in
+    /// one sentence. `None` unless the phase changes a force on the head along a straight ramp.
+    pub(crate) fn plunge(&self, simulation: &Simulation, none: &NoEquilibrium) -> Option<String> {
+        let problem = simulation.problem();
+        let mut names = problem.phases.iter().map(|phase| &phase.name);
+        let number = names.position(|name| *name == none.place.phase)?;
+        let phase = &problem.phases[number];
+        let end = self
+            .force_on_head(phase)
+            .filter(|_| phase.course.is_empty())?;
+        let start = self.force_before(problem, number);
+        let carried = start + none.reached / none.of as f64 * (end - start);
+        let at_reset = self.force_before(problem, self.counted_from(problem, number));
+        let unit = self.geometry.analysis.force_unit();
+        let (way, sign) = if end < start {
+            ("plunges at a head load", -1.0)
+        } else if end > 0.0 {
+            ("is pulled out at an uplift", 1.0)
+        } else {
+            ("has no equilibrium below a head load", -1.0)
+        };
+        let [carried_net, end_net] = [carried, end].map(|force| sign * (force - at_reset));
+        let advice = if (carried - start).abs() < 0.05 * (end - start).abs()
+            && end.abs() > MANY * carried.abs()
+        {
+            format!("forces are in {unit}: was it typed in N?")
+        } else {
+            "prescribe a `displacement` of the head instead of a `force`, or end the phase with `until`"
+                .to_owned()
+        };
+        Some(format!(
+            "pile: {way} of {carried_net:.1} {unit} (net), where phase `{}` asks for {end_net:.1}{}; {advice}",
+            phase.name,
+            self.mechanism(simulation, none)
+        ))
+    }
+
+    /// The vertical force that a phase puts on the head, if it does.
+    fn force_on_head(&self, phase: &Phase) -> Option<f64> {
+        let forces = phase.force.iter();
+        let mut own = forces.filter(|force| force.line == self.parts.head);
+        own.find_map(|force| force.y)
+    }
+
+    /// The one there is at the start of a phase.
+    fn force_before(&self, problem: &Problem, number: usize) -> f64 {
+        let mut before = problem.phases[..number].iter().rev();
+        before
+            .find_map(|phase| self.force_on_head(phase))
+            .unwrap_or(0.0)
+    }
+
+    /// The phase at whose start net loads are zero: the last one up to a phase that resets displacements, else the one
+    /// that activates the shaft.
+    fn counted_from(&self, problem: &Problem, number: usize) -> usize {
+        let phases = &problem.phases[..=number];
+        let resets = phases.iter().rposition(|phase| phase.reset_displacements);
+        let is_shaft = |group: &usize| self.parts.shaft.contains(group);
+        let begins = || {
+            phases
+                .iter()
+                .position(|phase| phase.activate.iter().any(is_shaft))
+        };
+        resets.or_else(begins).unwrap_or(0)
+    }
+
+    /// What of the pile gives way in the last attempt at a step, in words after a colon.
+    fn mechanism(&self, simulation: &Simulation, none: &NoEquilibrium) -> String {
+        let (groups, time) = (simulation.groups(), simulation.time());
+        let worst = none.failure.mechanism.as_ref();
+        let is_at =
+            |number: usize| worst.is_some_and(|worst| groups[number].name == worst.at.group);
+        let gives = |number: usize| {
+            let points = 0..groups[number].kinematics.n_points();
+            points.filter_map(move |point| groups[number].gives(point, time))
+        };
+        let shaft = &self.parts.shaft;
+        let modes: Vec<FailureMode> = shaft.iter().flat_map(|&number| gives(number)).collect();
+        let points = shaft
+            .iter()
+            .map(|&number| groups[number].kinematics.n_points());
+        let most_slide = 2 * modes.len() > points.sum::<usize>();
+        let opens = modes.iter().filter(|mode| **mode != FailureMode::Slides);
+        let mut said = Vec::new();
+        if most_slide || shaft.iter().any(|&number| is_at(number)) {
+            let opens = 2 * opens.count() > modes.len();
+            said.push(if opens {
+                "the shaft opens"
+            } else {
+                "the shaft slides"
+            });
+        }
+        let is_below = match &self.parts.base {
+            Base::Group(group) => is_at(*group) || gives(*group).next().is_some(),
+            Base::Line(_) => false,
+        };
+        let in_ground =
+            |worst: &Mechanism| matches!(worst.how, FailureMode::Yields | FailureMode::ComesApart);
+        if is_below || worst.is_some_and(in_ground) {
+            said.push("the base yields");
+        }
+        if said.is_empty() {
+            return worst.map_or_else(String::new, |worst| format!(": {}", worst.how));
+        }
+        format!(": {}", said.join(" and "))
+    }
+}

@@ -1,0 +1,135 @@
+//! Phases that end where a quantity reaches a value.
+#![expect(clippy::unwrap_used, reason = "part of the tests")]
+
+use crate::program::{BAD_INPUT, DONE, Edit, Outcome, Place, edited, refuses};
+
+/// Settlement of the block under the whole pressure, in the unit of its probe: it is linear but for the joint.
+fn run(edits: &[Edit]) -> (Outcome, Vec<Vec<String>>) {
+    let place = Place::new();
+    place.write("case.toml", edited(edits));
+    let outcome = place.run(&["run", "case.toml", "--out", "out"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let history = std::fs::read_to_string(place.path("out/history.csv")).unwrap();
+    let rows = history.lines().skip(1);
+    let rows = rows.map(|row| row.split(',').map(str::to_owned).collect());
+    (outcome, rows.collect())
+}
+
+const PROBES: Edit = (
+    "[probes]\n",
+    "[probes]\nbelow = { line = \"bottom\", quantity = \"reaction_y\" }\n",
+);
+
+fn of_phase(rows: &[Vec<String>], phase: &str) -> Vec<[f64; 3]> {
+    let own = rows.iter().filter(|row| row[0] == phase);
+    // Time, reaction below, settlement.
+    own.map(|row| [2, 3, 4].map(|column| row[column].parse().unwrap()))
+        .collect()
+}
+
+#[test]
+fn a_phase_ends_where_its_quantity_reaches_the_value() {
+    let (_, whole) = run(&[PROBES]);
+    let full = of_phase(&whole, "weight")[1];
+    let target = 0.3 * full[2];
+    let until = format!(
+        "pressure = [{{ line = \"top\", value = 10.0 }}]\nuntil = {{ quantity = \"settlement\", reaches = {target} }}"
+    );
+    let (outcome, rows) = run(&[
+        PROBES,
+        (
+            "pressure = [{ line = \"top\", value = 10.0 }]",
+            until.leak(),
+        ),
+    ]);
+    assert!(
+        outcome.says("`settlement` has reached"),
+        "{}",
+        outcome.stderr
+    );
+    let ended = of_phase(&rows, "weight");
+    let [time, below, settlement] = *ended.last().unwrap();
+    assert!(
+        settlement >= target * (1.0 - 1e-9) && settlement <= 1.01 * target,
+        "{settlement}"
+    );
+    // Linear: what the phase changed stays where it is, also in the next phase.
+    assert!((time / (settlement / full[2]) - 1.0).abs() < 1e-6, "{time}");
+    assert!((below / full[1] - time).abs() < 1e-9, "{below}");
+    for [later, below, _] in of_phase(&rows, "push") {
+        assert!((below / full[1] - time).abs() < 1e-9, "{below}");
+        assert!(later > time && later <= time + 1.0 + 1e-12, "{later}");
+    }
+}
+
+#[test]
+fn what_is_reached_already_takes_no_increment() {
+    let (outcome, rows) = run(&[
+        PROBES,
+        (
+            "displacement = [{ line = \"top\", x = 1e-5 }]",
+            "pressure = [{ line = \"top\", value = 20.0 }]\nuntil = { quantity = \"settlement\", reaches = 0.01 }",
+        ),
+    ]);
+    assert_eq!(
+        of_phase(&rows, "push"),
+        Vec::<[f64; 3]>::new(),
+        "{}",
+        outcome.stderr
+    );
+    assert!(
+        outcome.says("phase push: no increment"),
+        "{}",
+        outcome.stderr
+    );
+}
+
+#[test]
+fn what_is_not_reached_is_said() {
+    let (outcome, rows) = run(&[
+        PROBES,
+        (
+            "displacement = [{ line = \"top\", x = 1e-5 }]",
+            "displacement = [{ line = \"top\", x = 1e-5 }]\nuntil = { quantity = \"settlement\", reaches = 1e3 }",
+        ),
+    ]);
+    assert_eq!(of_phase(&rows, "push").len(), 2);
+    assert!(
+        outcome.says("`settlement` has not reached 1000"),
+        "{}",
+        outcome.stderr
+    );
+}
+
+#[test]
+fn refuses_what_would_be_left_half_done() {
+    refuses(
+        BAD_INPUT,
+        &[
+            (
+                "no such quantity",
+                &[(
+                    "name = \"push\"",
+                    "name = \"push\"\nuntil = { quantity = ^\"setlement\", reaches = 1.0 }",
+                )],
+                &["`setlement`", "did you mean `settlement`?"],
+            ),
+            (
+                "a change of laws",
+                &[(
+                    "name = \"push\"",
+                    "name = \"push\"\nlaws = { layer = \"joint\" }\nuntil = ^{ quantity = \"settlement\", reaches = 1.0 }",
+                )],
+                &["`until` may end this phase before its time", "`laws`"],
+            ),
+            (
+                "a strain",
+                &[(
+                    "name = \"push\"",
+                    "name = \"push\"\nstrain = { soil = 1e-5 }\nuntil = ^{ quantity = \"settlement\", reaches = 1.0 }",
+                )],
+                &["`strain` would be left half done"],
+            ),
+        ],
+    );
+}
