@@ -101,7 +101,11 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
             let stop = stop_on_signals()?;
             studies::study(&opener, (&file, out.as_deref()), &what, &how, stop)
         }
-        Command::Report { folders, out } => write_report(&folders, out),
+        Command::Report {
+            folders,
+            out,
+            print,
+        } => write_report(&folders, out, print),
         Command::Table { folders, out } => {
             let table = results::run_table::of(&folders)?;
             match out {
