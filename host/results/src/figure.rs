@@ -2,7 +2,7 @@
 //! measured points.
 
 use crate::output_request::{Cut, Figure, Measured};
-use crate::pile::Station;
+use crate::pile::{State, Station};
 use crate::pressures::Pressure;
 use mechanics::Place;
 use mechanics::simulation::Snapshot;
@@ -147,9 +147,16 @@ impl Figures {
         }
     }
 
-    /// Takes what holds along the pile, where that is asked for after this increment, one of `of`.
-    pub(crate) fn along_pile(&mut self, place: &Place, of: usize, stations: &[Station]) {
-        let Place { phase, increment } = place;
+    /// Takes what holds along the pile, where that is asked for after this increment, one of `of`. The curve is named by
+    /// the head load, net if there is one.
+    pub(crate) fn along_pile(
+        &mut self,
+        place: &Place,
+        of: usize,
+        (state, unit): (&State, &str),
+    ) {
+        let phase = &place.phase;
+        let load = state.net.map_or(state.loads.head, |net| net[0]);
         for (figure, curves) in &mut self.drawn {
             let increments = figure.along_pile.as_ref();
             if !increments.is_some_and(|increments| asks(figure, increments, place, of)) {
@@ -158,10 +165,10 @@ impl Figures {
             for y in &figure.y {
                 let pair = |station: &Station| Some((station.named(&figure.x)?, station.named(y)?));
                 let name = match figure.y.len() {
-                    1 => format!("{phase} {increment}"),
-                    _ => format!("{y}, {phase} {increment}"),
+                    1 => format!("{phase}, {load:.0} {unit}"),
+                    _ => format!("{y}, {phase}, {load:.0} {unit}"),
                 };
-                let points = stations.iter().filter_map(pair).collect();
+                let points = state.stations.iter().filter_map(pair).collect();
                 curves.push(Curve { name, points });
             }
         }

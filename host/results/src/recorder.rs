@@ -438,8 +438,8 @@ impl Recorder {
         if let Some(of_pile) = &mut self.pile {
             of_pile.add(place, pile.as_ref(), snapshot)?;
         }
-        if let Some(state) = &pile {
-            self.figures.along_pile(place, *of, &state.stations);
+        if let (Some(of_pile), Some(state)) = (&self.pile, &pile) {
+            self.figures.along_pile(place, *of, (state, of_pile.unit()));
         }
         if self.settings.points.includes(place.increment, *of)
             && let Some(points) = &mut self.points

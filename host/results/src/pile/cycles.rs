@@ -8,6 +8,8 @@ use text::write::replace;
 
 /// Reversals smaller than this share of the largest load are none.
 const LEAST: f64 = 0.01;
+/// Loads closer than this share of the largest are one: where a pile slides, a reversal is at its end.
+const SAME: f64 = 1e-6;
 /// Name of the file.
 pub(crate) const FILE_NAME: &str = "cycles.csv";
 const COLUMNS: [&str; 8] = [
@@ -95,12 +97,12 @@ fn cycles(curve: &Curve) -> Vec<Cycle<'_>> {
     }
     courses
         .iter()
-        .flat_map(|course| pairs(course, least))
+        .flat_map(|course| pairs(course, least, SAME * largest))
         .collect()
 }
 
 /// The pairs of a course, from its start.
-fn pairs<'c>(course: &[Head<'c>], least: f64) -> Vec<Cycle<'c>> {
+fn pairs<'c>(course: &[Head<'c>], least: f64, same: f64) -> Vec<Cycle<'c>> {
     let mut pairs: Vec<Cycle<'c>> = Vec::new();
     let Some(&start) = course.first() else {
         return pairs;
@@ -120,13 +122,13 @@ fn pairs<'c>(course: &[Head<'c>], least: f64) -> Vec<Cycle<'c>> {
     let (mut max, mut min) = (None, Some(start));
     for &head in course {
         match (max, min) {
-            (_, Some(low)) if head.load < low.load => min = Some(head),
-            (_, Some(low)) if head.load > low.load && head.load - low.load >= least => {
+            (_, Some(low)) if head.load <= low.load + same => min = Some(head),
+            (_, Some(low)) if head.load - low.load >= least => {
                 end(max, low);
                 (max, min) = (Some(head), None);
             }
-            (Some(high), None) if head.load > high.load => max = Some(head),
-            (Some(high), None) if head.load < high.load && high.load - head.load >= least => {
+            (Some(high), None) if head.load >= high.load - same => max = Some(head),
+            (Some(high), None) if high.load - head.load >= least => {
                 min = Some(head);
             }
             _ => {}

@@ -119,6 +119,11 @@ impl Record {
         Ok(())
     }
 
+    /// Unit of its forces.
+    pub(crate) fn unit(&self) -> &'static str {
+        self.pile.geometry.analysis.force_unit()
+    }
+
     pub(crate) fn resistances(&self) -> Resistances {
         self.curve.resistances(&self.pile)
     }
