@@ -37,10 +37,11 @@ under = {{ r = [{RADIUS}, 0.5], z = 0.0 }}
 head = {{ r = [0.0, {RADIUS}], z = {LENGTH} }}
 foot = {{ r = [0.0, {RADIUS}], z = 0.0 }}
 [laws]
-rigid = {{ law = "elastic", parameters = {{ young_modulus = 1e12, poisson_ratio = 0.0 }} }}
+rigid = {{ law = "elastic", parameters = {{ young_modulus = 1e13, poisson_ratio = 0.0 }} }}
+steel = {{ law = "elastic", parameters = {{ young_modulus = 1e13, poisson_ratio = 0.0 }} }}
 skin = {{ law = "coulomb_joint", parameters = {{ normal_stiffness = 1e6, shear_stiffness = {STIFFNESS}, cohesion = {cohesion}, friction_angle = 0.0, dilatancy_angle = 0.0 }} }}
 [groups]
-pile = {{ formulation = "solid", law = "rigid", initial_stress = {{ stress_11 = -100.0, stress_33 = -100.0 }} }}
+pile = {{ formulation = "solid", law = "steel", initial_stress = {{ stress_11 = -100.0, stress_33 = -100.0 }} }}
 ground = {{ formulation = "solid", law = "rigid", initial_stress = {{ stress_11 = -100.0, stress_33 = -100.0 }} }}
 skin = {{ formulation = "zero_thickness", line = "wall", law = "skin" }}
 [[supports]]
@@ -252,7 +253,7 @@ fn a_pull_has_the_criteria_of_a_push() {
             for criterion in ["10_percent_diameter", "davisson"] {
                 let of = |part: &str| number(pile, &format!("resistance_{criterion}{part}"));
                 close(of("_shaft"), limit, 1e-6, "shaft");
-                assert!(of("_base").abs() < 1e-6, "{pile}");
+                assert!(of("_base").abs() < 1e-6 * limit, "{pile}");
             }
         }
     }

@@ -7,6 +7,12 @@ use mechanics::problem::Formulation;
 /// A law with these words in its description is a load transfer curve: its slip is that of the ground.
 const TRANSFER: &str = "load transfer";
 
+/// Whether the law of an interface is a load transfer curve.
+pub(super) fn is_transfer(group: &Group) -> bool {
+    let law = group.law.built.law.description();
+    law.doc.to_lowercase().contains(TRANSFER)
+}
+
 impl Pile {
     /// Elastic slip of the joints under a unit friction, m/kPa, by span; `None` where no joint is, or one whose law is a
     /// load transfer curve or has no elastic operator.
@@ -14,9 +20,8 @@ impl Pile {
         let of_facet = |number: &usize| -> Option<f64> {
             let facet = &self.geometry.shaft[*number];
             let group = &groups[facet.group];
-            let law = group.law.built.law.description();
-            let is_transfer = law.doc.to_lowercase().contains(TRANSFER);
-            if group.formulation != Formulation::ZeroThickness || !group.is_active || is_transfer {
+            let is_joint = group.formulation == Formulation::ZeroThickness;
+            if !is_joint || !group.is_active || is_transfer(group) {
                 return None;
             }
             let points = group.kinematics.points_of(facet.element);

@@ -3,8 +3,8 @@
 //! An interface of some stiffness lets its tractions swing from node to node about their mean. So the values at the
 //! ends of elements are read from the means of the two elements beside them, and the one in the middle follows
 //! from the element's own mean: by Simpson's rule the three give it back, which is the element's force over its area.
-//! Where a value would leave the range of the tractions in its element, as at the edge of a part that slides, the
-//! tractions at the ends are taken as they are.
+//! Where friction and normal stress would be no mean of the tractions in the element, as at the edge of a part that
+//! slides, the tractions at its ends are taken as they are: no value is beyond a convex limit of the law.
 
 use super::geometry::{Facet, Geometry};
 use super::rows::Span;
@@ -23,8 +23,16 @@ struct Average {
     mean: Skin,
     /// As the interface has them nearest to the upper and lower end.
     ends: [Skin; 2],
-    /// Smallest and largest friction at its points.
-    range: [f64; 2],
+}
+
+impl Average {
+    /// Friction and normal stress at its ends, and in its middle by Simpson's rule.
+    fn tractions(&self) -> [[f64; 2]; 3] {
+        let [top, bottom] = self.ends;
+        let at = |i: usize| [top[i], (6.0 * self.mean[i] - top[i] - bottom[i]) / 4.0, bottom[i]];
+        let [friction, normal] = [0, 1].map(at);
+        std::array::from_fn(|k| [friction[k], normal[k]])
+    }
 }
 
 /// Values at the top, in the middle and at the bottom of each span; `None` where no shaft is.
@@ -77,11 +85,9 @@ fn average(
             add(&mut all.ends[0][i], own.ends[0][i]);
             add(&mut all.ends[1][i], own.ends[1][i]);
         }
-        add(&mut all.range[0], own.range[0]);
-        add(&mut all.range[1], own.range[1]);
     }
     let sums = [&mut all.mean].into_iter().chain(&mut all.ends);
-    for value in sums.flatten().chain(&mut all.range) {
+    for value in sums.flatten() {
         *value /= girths;
     }
     all
@@ -139,42 +145,27 @@ fn of_facet(
             there.iter().map(|value| value[i]).sum::<f64>() / there.len() as f64
         })
     };
-    let friction = values.iter().map(|value| value[0]);
     Average {
         height: heights[0] - heights[1],
         mean,
         ends: heights.map(nearest),
-        range: friction.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
-            [low.min(value), high.max(value)]
-        }),
     }
 }
 
-/// The end of a span between two others, or of the last: how far it is from the tractions there (0) to what the means
-/// give (1).
+/// The end of a span: the tractions there, or what the means of the spans beside it give.
 #[derive(Clone, Copy)]
 struct End {
     tractions: Skin,
     by_means: Skin,
-    share: f64,
+    is_smooth: bool,
 }
 
 impl End {
-    fn value(&self, i: usize) -> f64 {
-        self.tractions[i] + self.share * (self.by_means[i] - self.tractions[i])
-    }
-
-    /// Moves the friction into a range, if the tractions are in it.
-    fn keep_within(&mut self, [low, high]: [f64; 2]) {
-        let (from, to) = (self.tractions[0], self.by_means[0]);
-        if to < low || to > high {
-            let bound = to.clamp(low.min(high), high.max(low));
-            let share = (bound - from) / (to - from);
-            self.share = if share.is_finite() {
-                share.clamp(0.0, 1.0)
-            } else {
-                0.0
-            };
+    fn value(&self) -> Skin {
+        if self.is_smooth {
+            self.by_means
+        } else {
+            self.tractions
         }
     }
 }
@@ -183,76 +174,72 @@ impl End {
 fn smooth(spans: &[Average]) -> Vec<[Skin; 3]> {
     let n = spans.len();
     let mut ends: Vec<End> = (0..=n).map(|number| end(spans, number)).collect();
-    let middle = |ends: &[End], number: usize, i: usize| {
-        let sum = ends[number].value(i) + ends[number + 1].value(i);
-        (6.0 * spans[number].mean[i] - sum) / 4.0
+    let values = |ends: &[End], number: usize| -> [Skin; 3] {
+        let [top, bottom] = [ends[number].value(), ends[number + 1].value()];
+        let mean = spans[number].mean;
+        let middle = std::array::from_fn(|i| (6.0 * mean[i] - top[i] - bottom[i]) / 4.0);
+        [top, middle, bottom]
     };
     loop {
-        let mut is_done = true;
-        for (number, span) in spans.iter().enumerate() {
-            let [low, high] = span.range;
-            let slack = 1e-9 * (low.abs() + high.abs());
-            let value = middle(&ends, number, 0);
-            let is_smooth = ends[number].share > 0.0 || ends[number + 1].share > 0.0;
-            if is_smooth && (value < low - slack || value > high + slack) {
-                ends[number].share = 0.0;
-                ends[number + 1].share = 0.0;
-                is_done = false;
-            }
-        }
-        if is_done {
-            break;
-        }
-    }
-    let values = |number: usize| {
-        let of = |i: usize| {
-            [
-                ends[number].value(i),
-                middle(&ends, number, i),
-                ends[number + 1].value(i),
-            ]
+        let is_odd = |number: &usize| {
+            let [_, [friction, normal, _], _] = values(&ends, *number);
+            (ends[*number].is_smooth || ends[*number + 1].is_smooth)
+                && !is_mean(spans[*number].tractions(), [friction, normal])
         };
-        let [friction, normal, slip] = [0, 1, 2].map(of);
-        std::array::from_fn(|part| [friction[part], normal[part], slip[part]])
-    };
-    (0..n).map(values).collect()
+        let Some(odd) = (0..n).find(is_odd) else {
+            break;
+        };
+        ends[odd].is_smooth = false;
+        ends[odd + 1].is_smooth = false;
+    }
+    (0..n).map(|number| values(&ends, number)).collect()
 }
 
-/// The upper end of a span; of all, the lower end of the last.
+/// The upper end of a span; of all, the lower end of the last. Where nothing goes on, tractions stay as they are.
 fn end(spans: &[Average], number: usize) -> End {
     let n = spans.len();
     let of = |f: &dyn Fn(usize) -> f64| -> Skin { std::array::from_fn(f) };
     if 0 < number && number < n {
         let (a, b) = (&spans[number - 1], &spans[number]);
         let whole = a.height + b.height;
-        let mut end = End {
+        return End {
             tractions: of(&|i| f64::midpoint(a.ends[1][i], b.ends[0][i])),
             by_means: of(&|i| (b.height * a.mean[i] + a.height * b.mean[i]) / whole),
-            share: 1.0,
+            is_smooth: true,
         };
-        let range = [a.range[0].max(b.range[0]), a.range[1].min(b.range[1])];
-        end.keep_within(range);
-        return end;
     }
-    let (span, next, side) = if number == 0 {
-        (&spans[0], spans.get(1), 0)
+    let tractions = if number == 0 {
+        spans[0].ends[0]
     } else {
-        (&spans[n - 1], n.checked_sub(2).map(|last| &spans[last]), 1)
+        spans[n - 1].ends[1]
     };
-    let by_means = |i: usize| match next {
-        Some(next) => {
-            let whole = span.height + next.height;
-            span.mean[i] + (span.mean[i] - next.mean[i]) * span.height / whole
-        }
-        None => span.ends[side][i],
+    End {
+        tractions,
+        by_means: tractions,
+        is_smooth: false,
+    }
+}
+
+/// Whether a point is a mean of three, with weights that are not negative.
+fn is_mean(three: [[f64; 2]; 3], point: [f64; 2]) -> bool {
+    let size = three.iter().flatten().fold(0.0, |m: f64, v| m.max(v.abs()));
+    let slack = 1e-9 * size;
+    let is_between = |c: usize| {
+        let [low, high] = three.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], at| {
+            [l.min(at[c]), h.max(at[c])]
+        });
+        low - slack <= point[c] && point[c] <= high + slack
     };
-    let mut end = End {
-        tractions: span.ends[side],
-        by_means: of(&by_means),
-        share: 1.0,
+    let is_inside = |k: usize| {
+        let [a, b, opposite] = [three[k], three[(k + 1) % 3], three[(k + 2) % 3]];
+        let along = [b[0] - a[0], b[1] - a[1]];
+        let side = |at: [f64; 2]| along[0] * (at[1] - a[1]) - along[1] * (at[0] - a[0]);
+        let (whole, part) = (side(opposite), side(point));
+        let part = if whole < 0.0 { -part } else { part };
+        let slack = slack * along[0].hypot(along[1]);
+        -slack <= part && part <= whole.abs() + slack
     };
-    end.keep_within(span.range);
-    end
+    is_between(0) && is_between(1) && (0..3).all(is_inside)
 }
 
 #[cfg(test)]
@@ -261,12 +248,10 @@ mod tests {
 
     /// An element with these values at its ends and in its middle.
     fn span(height: f64, [top, middle, bottom]: [f64; 3]) -> Average {
-        let low = top.min(middle).min(bottom);
         Average {
             height,
             mean: [(top + 4.0 * middle + bottom) / 6.0; 3],
             ends: [[top; 3], [bottom; 3]],
-            range: [low, top.max(middle).max(bottom)],
         }
     }
 
@@ -275,6 +260,7 @@ mod tests {
         values.map(|span| span.map(|value| value[0])).collect()
     }
 
+    /// But for the first and the last element.
     #[test]
     fn what_swings_about_a_line_becomes_the_line() {
         // A swing of which Simpson's rule sees nothing: +d at the ends, −d/2 in the middle.
@@ -288,12 +274,15 @@ mod tests {
             z += height;
         }
         z = 0.0;
-        for (found, height) in friction(&spans).into_iter().zip(heights) {
+        for (number, (found, height)) in friction(&spans).into_iter().zip(heights).enumerate() {
             let expected = [0.0, 0.5, 1.0].map(|t| line(z + t * height));
+            z += height;
+            if number == 0 || number == heights.len() - 1 {
+                continue;
+            }
             for (found, expected) in found.into_iter().zip(expected) {
                 assert!((found - expected).abs() < 1e-12, "{found} for {expected}");
             }
-            z += height;
         }
     }
 
