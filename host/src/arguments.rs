@@ -44,6 +44,9 @@ pub(crate) enum Command {
         /// The report's file [default: report.html in the folder, or next to the folders].
         #[arg(long)]
         out: Option<PathBuf>,
+        /// For paper: A4 without controls, a title block, all settings as an appendix.
+        #[arg(long)]
+        print: bool,
     },
     /// Write a table of runs: settings that differ, last values of probes.
     Table {

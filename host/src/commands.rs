@@ -23,7 +23,11 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
         Command::Run(asked) => cases::run(&asked, opener),
         Command::Point(asked) => run_point(&asked, opener),
         Command::Study(asked) => studies::study(&asked, &opener),
-        Command::Report { folders, out } => write_report(&folders, out),
+        Command::Report {
+            folders,
+            out,
+            print,
+        } => write_report(&folders, out, print),
         Command::Table { folders, out } => write_table(&folders, out.as_deref()),
         Command::TradeOff(asked) => study_settings(asked, opener),
         Command::Calibrate(asked) => calibrate(asked, opener),

@@ -126,10 +126,10 @@ impl Observer for Progress {
         self.finish();
         let unit = resistances.unit;
         // Nothing has no sign.
-        let tenths = |force: &f64| (10.0 * force).round() / 10.0 + 0.0;
+        let tenths = |force: f64| (10.0 * force).round() / 10.0 + 0.0;
         let line = match &resistances.ten_percent {
-            Ok(forces) => {
-                let [head, shaft, base] = forces.each_ref().map(tenths);
+            Ok(found) => {
+                let [head, shaft, base] = [found.head, found.shaft, found.base].map(tenths);
                 format!(
                     "pile: resistance at 10 % of the diameter ({:.4} m) {head:.1} {unit}, of it shaft {shaft:.1} \
                  and base {base:.1}",

@@ -17,6 +17,7 @@ mod names;
 mod overflow;
 mod parameters;
 mod pile;
+mod pile_loads;
 mod plausible;
 mod point;
 mod program;

@@ -622,6 +622,9 @@ pub struct FigureInput {
     pub y: Vec<Spanned<String>>,
     /// Text of this axis.
     pub y_label: Option<String>,
+    /// The vertical axis points downward, as for settlements.
+    #[serde(default)]
+    pub y_reversed: bool,
     /// Only this phase; default: all.
     #[schemars(with = "Option<String>")]
     pub phase: Option<Spanned<String>>,
@@ -697,6 +700,12 @@ pub struct MeasuredInput {
     /// Factor of its values.
     #[serde(default = "one")]
     pub y_scale: f64,
+    /// Added to its values after the factor.
+    #[serde(default)]
+    pub x_offset: f64,
+    /// Added to its values after the factor.
+    #[serde(default)]
+    pub y_offset: f64,
 }
 
 fn measured() -> String {

@@ -146,6 +146,7 @@ fn wanted(source: &Source, input: &FigureInput) -> Result<Figure, Error> {
         x_label: input.x_label.clone(),
         y: input.y.iter().map(|y| y.get_ref().clone()).collect(),
         y_label: input.y_label.clone(),
+        y_reversed: input.y_reversed,
         phase: input.phase.as_ref().map(|phase| phase.get_ref().clone()),
         points: input.points.as_ref().map(Cut::from),
         along_pile: input

@@ -46,7 +46,8 @@ pub(crate) fn read(source: &Source, input: &MeasuredInput) -> Result<Measured, E
             table.number(&row, y, &input.y)?,
         );
         if let (Some(x), Some(y)) = values {
-            points.push((input.x_scale * x, input.y_scale * y));
+            let x = input.x_scale * x + input.x_offset;
+            points.push((x, input.y_scale * y + input.y_offset));
         }
         if points.len() > MOST_POINTS {
             let message = format!(
@@ -69,13 +70,15 @@ pub(crate) fn read(source: &Source, input: &MeasuredInput) -> Result<Measured, E
         .iter()
         .find(|(x, y)| !(x.is_finite() && y.is_finite()))
     {
-        let message = format!("`file`: times its factors a point is ({x}, {y}), no finite number");
+        let message =
+            format!("`file`: with its factors and offsets a point is ({x}, {y}), no finite number");
         return Err(at_file(message));
     }
     Ok(Measured {
         label: input.label.clone(),
         points,
         of_curve: None,
+        colour_of: None,
     })
 }
 

@@ -68,19 +68,23 @@ pub fn overflow(case: &Case, probe: &str, place: &Place) -> Error {
 /// Refuses a probe that is called as a column of the tables that it would be written to.
 fn refuse_column(case: &Case, name: &Spanned<String>) -> Result<(), Error> {
     let has_path = case.file.solver.get_ref().control == Control::ArcLength;
-    let mut tables = vec![("history.csv", OF_HISTORY)];
-    tables.extend(has_path.then_some(("path.csv", OF_PATH)));
+    let mut tables: Vec<(&str, &[&str])> = vec![("history.csv", &OF_HISTORY)];
+    tables.extend(has_path.then_some::<(&str, &[&str])>(("path.csv", &OF_PATH)));
     tables.extend(
         case.file
             .pile
             .as_ref()
-            .map(|_| ("history.csv", results::pile::COLUMNS)),
+            .map(|_| ("history.csv", &results::pile::COLUMNS[..])),
     );
-    let taken = |(_, columns): &&(&str, [&str; 4])| columns.contains(&name.get_ref().as_str());
+    let taken = |(_, columns): &&(&str, &[&str])| columns.contains(&name.get_ref().as_str());
     let Some((table, _)) = tables.iter().find(taken) else {
         return Ok(());
     };
-    let mut reserved: Vec<&str> = tables.iter().flat_map(|(_, columns)| *columns).collect();
+    let mut reserved: Vec<&str> = tables
+        .iter()
+        .flat_map(|(_, columns)| *columns)
+        .copied()
+        .collect();
     reserved.sort_unstable();
     reserved.dedup();
     let message = format!(

@@ -2,7 +2,7 @@
 //! measured points.
 
 use crate::output_request::{Cut, Figure, Measured};
-use crate::pile::Station;
+use crate::pile::{State, Station};
 use crate::pressures::Pressure;
 use mechanics::Place;
 use mechanics::simulation::Snapshot;
@@ -54,6 +54,8 @@ struct Labels {
     x: String,
     /// Along the vertical axis.
     y: String,
+    /// The vertical axis points downward.
+    y_reversed: bool,
 }
 
 /// The figures of a run, filled as it goes.
@@ -145,9 +147,11 @@ impl Figures {
         }
     }
 
-    /// Takes what holds along the pile, where that is asked for after this increment, one of `of`.
-    pub(crate) fn along_pile(&mut self, place: &Place, of: usize, stations: &[Station]) {
-        let Place { phase, increment } = place;
+    /// Takes what holds along the pile, where that is asked for after this increment, one of `of`. The curve is named by
+    /// the head load, net if there is one.
+    pub(crate) fn along_pile(&mut self, place: &Place, of: usize, (state, unit): (&State, &str)) {
+        let phase = &place.phase;
+        let load = state.net.map_or(state.loads.head, |net| net[0]);
         for (figure, curves) in &mut self.drawn {
             let increments = figure.along_pile.as_ref();
             if !increments.is_some_and(|increments| asks(figure, increments, place, of)) {
@@ -156,10 +160,10 @@ impl Figures {
             for y in &figure.y {
                 let pair = |station: &Station| Some((station.named(&figure.x)?, station.named(y)?));
                 let name = match figure.y.len() {
-                    1 => format!("{phase} {increment}"),
-                    _ => format!("{y}, {phase} {increment}"),
+                    1 => format!("{phase}, {load:.0} {unit}"),
+                    _ => format!("{y}, {phase}, {load:.0} {unit}"),
                 };
-                let points = stations.iter().filter_map(pair).collect();
+                let points = state.stations.iter().filter_map(pair).collect();
                 curves.push(Curve { name, points });
             }
         }
@@ -171,7 +175,8 @@ impl Figures {
     /// [`Error::Unwritable`].
     pub fn draw(&self, folder: &Path) -> Result<(), Error> {
         for (figure, curves) in &self.drawn {
-            draw_file(folder, figure, &self.title, curves)?;
+            let measured = coloured(&figure.measured, curves.len());
+            draw_file(folder, figure, &self.title, (curves, &measured))?;
         }
         Ok(())
     }
@@ -203,7 +208,7 @@ impl Figures {
                     });
                 }
             }
-            draw_file(folder, figure, &first.title, &curves)?;
+            draw_file(folder, figure, &first.title, (&curves, &figure.measured))?;
         }
         Ok(())
     }
@@ -264,14 +269,34 @@ fn cut_points(cut: &Cut, quantities: [&str; 2], snapshot: &Snapshot<'_>) -> Vec<
     points
 }
 
-fn draw_file(folder: &Path, figure: &Figure, title: &str, curves: &[Curve]) -> Result<(), Error> {
+/// Measured points with the colour of the curve that they belong to: the only one, or one for each table.
+fn coloured(measured: &[Measured], n_curves: usize) -> Vec<Measured> {
+    let is_one_each = n_curves == measured.len();
+    let mut coloured = measured.to_vec();
+    for (number, measured) in coloured.iter_mut().enumerate() {
+        measured.colour_of = if n_curves == 1 {
+            Some(0)
+        } else {
+            is_one_each.then_some(number)
+        };
+    }
+    coloured
+}
+
+fn draw_file(
+    folder: &Path,
+    figure: &Figure,
+    title: &str,
+    (curves, measured): (&[Curve], &[Measured]),
+) -> Result<(), Error> {
     let path = folder.join(format!("{}.svg", figure.name));
     let labels = Labels {
         title: figure.title.clone().unwrap_or_else(|| title.to_owned()),
         x: figure.x_label.clone().unwrap_or_else(|| figure.x.clone()),
         y: figure.y_label.clone().unwrap_or_default(),
+        y_reversed: figure.y_reversed,
     };
-    let text = svg(&labels, curves, &figure.measured)
+    let text = svg(&labels, curves, measured)
         .map_err(|error| Error::Internal(format!("figure {}: {error}", path.display())))?;
     replace(&path, text)
 }
@@ -302,6 +327,7 @@ fn draw(
     let entries = names().count();
     let x = range(points().map(|p| p.0), 0.0);
     let y = range(points().map(|p| p.1), 0.05);
+    let y = if labels.y_reversed { y.end..y.start } else { y };
     let longest = names().map(|name| name.chars().count()).max();
     let legend = [42 + 7 * longest.unwrap_or(0), 16 + 17 * entries];
     let corner = empty_corner(curves, measured, [&x, &y], legend);
@@ -344,7 +370,8 @@ fn draw(
     }
     let mut number = curves.len();
     for measured in measured {
-        let colour = COLOURS[measured.of_curve.unwrap_or(number) % COLOURS.len()];
+        let own = measured.of_curve.or(measured.colour_of);
+        let colour = COLOURS[own.unwrap_or(number) % COLOURS.len()];
         let style = colour.stroke_width(1);
         let markers = measured.points.iter();
         let drawn = chart.draw_series(markers.map(|&point| Circle::new(point, MARKER, style)))?;

@@ -9,12 +9,13 @@ use text::Error;
 
 /// Files that every run writes, or may write, under the same name. `history.csv` and `log.jsonl`
 /// are begun again by each.
-const NAMES: [&str; 11] = [
+const NAMES: [&str; 12] = [
     law::capsule::FILE_NAME,
     crate::checkpoint::FILE_NAME,
     "path.csv",
     "profile.csv",
     "pile.csv",
+    "cycles.csv",
     "points.csv",
     "fields.pvd",
     "report.html",

@@ -60,6 +60,8 @@ pub struct Figure {
     pub y: Vec<String>,
     /// Text of the vertical axis.
     pub y_label: Option<String>,
+    /// The vertical axis points downward.
+    pub y_reversed: bool,
     /// Only this phase; all if left out.
     pub phase: Option<String>,
     /// The integration points of a cut instead of columns.
@@ -88,6 +90,8 @@ pub struct Measured {
     /// The curve, from 0, that they are measured values of: they have its colour and no separate
     /// entry in the legend.
     pub of_curve: Option<usize>,
+    /// The curve, from 0, whose colour they have, with an entry in the legend.
+    pub colour_of: Option<usize>,
 }
 
 /// Integration points inside extents (ends excluded), at chosen increments.

@@ -12,15 +12,25 @@
 //! in common is divided by what the interface's own element exerts on it; all else of the node is the
 //! head's, or the base's.
 
+mod compliance;
 mod criteria;
+mod cycles;
+mod downdrag;
+mod friction;
 mod geometry;
+mod net;
 mod plausibility;
 mod plunge;
+mod record;
+mod rows;
+mod section;
+mod split;
 mod table;
 
-pub use criteria::{Curve, Resistances};
+pub use criteria::{Criterion, Curve, Resistances};
+pub use downdrag::Downdrag;
 pub use geometry::Misfit;
-pub(crate) use table::Stations;
+pub(crate) use record::{Kept, Record};
 
 use crate::probe::Sizes;
 use geometry::{Facet, Geometry};
@@ -28,18 +38,39 @@ use mechanics::Simulation;
 use mechanics::group::Group;
 use mechanics::problem::{Analysis, Formulation};
 use mechanics::simulation::{Part, Snapshot};
+use net::Net;
+use rows::Row;
+use split::Split;
+use table::Stations;
 
 /// Columns of `history.csv` that a pile has.
-pub const COLUMNS: [&str; 4] = [
+pub const COLUMNS: [&str; 10] = [
     "pile_head_load",
     "pile_shaft_load",
     "pile_base_load",
     "pile_settlement",
+    "pile_head_load_net",
+    "pile_shaft_load_net",
+    "pile_base_load_net",
+    "pile_neutral_plane",
+    "pile_max_axial_force",
+    "pile_dragload",
 ];
 
+/// Whether a column is a length, m; the others are forces.
+pub(crate) fn is_length(column: &str) -> bool {
+    matches!(column, "pile_settlement" | "pile_neutral_plane")
+}
+
 /// How large the columns could be, by what is in the model.
-pub(crate) fn sizes(of: &Sizes) -> [f64; 4] {
-    [of.force, of.force, of.force, of.length]
+pub(crate) fn sizes(of: &Sizes) -> [f64; COLUMNS.len()] {
+    COLUMNS.map(|column| {
+        if is_length(column) {
+            of.length
+        } else {
+            of.force
+        }
+    })
 }
 
 /// The pile that a case names.
@@ -89,9 +120,9 @@ pub struct Loads {
 }
 
 impl Loads {
-    /// In the order of [`COLUMNS`].
-    pub fn values(&self) -> [f64; 4] {
-        [self.head, self.shaft, self.base, self.settlement]
+    /// Of head, shaft and base.
+    pub(crate) fn of_parts(&self) -> [f64; 3] {
+        [self.head, self.shaft, self.base]
     }
 }
 
@@ -110,16 +141,22 @@ pub struct Station {
     pub slip: Option<f64>,
     /// m.
     pub settlement: f64,
+    /// Change of the axial force since the last reset, kN.
+    pub axial_force_net: Option<f64>,
+    /// Change of the friction since the last reset, kPa.
+    pub shaft_friction_net: Option<f64>,
 }
 
 /// Quantities of a [`Station`]: columns of `pile.csv`, and choices for figures along the pile.
-pub const OF_STATION: [&str; 6] = [
+pub const OF_STATION: [&str; 8] = [
     "z",
     "axial_force",
     "shaft_friction",
     "normal_stress",
     "slip",
     "settlement",
+    "axial_force_net",
+    "shaft_friction_net",
 ];
 
 impl Station {
@@ -132,6 +169,8 @@ impl Station {
             "normal_stress" => self.normal_stress,
             "slip" => self.slip,
             "settlement" => Some(self.settlement),
+            "axial_force_net" => self.axial_force_net,
+            "shaft_friction_net" => self.shaft_friction_net,
             _ => None,
         }
     }
@@ -142,8 +181,32 @@ impl Station {
 pub struct State {
     /// Its loads.
     pub loads: Loads,
+    /// Change of head, shaft and base load since the last reset, kN.
+    pub net: Option<[f64; 3]>,
+    /// What ground that drags it down does to it.
+    pub downdrag: Downdrag,
     /// From the head to the base.
     pub stations: Vec<Station>,
+}
+
+impl State {
+    /// In the order of [`COLUMNS`].
+    pub fn values(&self) -> [Option<f64>; COLUMNS.len()] {
+        let [head, shaft, base] = self.loads.of_parts().map(Some);
+        let net = |part: usize| self.net.map(|net| net[part]);
+        [
+            head,
+            shaft,
+            base,
+            Some(self.loads.settlement),
+            net(0),
+            net(1),
+            net(2),
+            self.downdrag.neutral_plane,
+            Some(self.downdrag.max_axial_force),
+            Some(self.downdrag.dragload),
+        ]
+    }
 }
 
 /// What holds at a facet of the shaft: upward forces on the pile's nodes, of the facet alone.
@@ -218,7 +281,7 @@ impl Pile {
         if shaft.iter().any(starts_closed) {
             part.groups.fill(true);
         }
-        let nodes = self.geometry.settle.iter().flatten();
+        let nodes = self.geometry.rows.iter().flat_map(|row| &row.nodes);
         part.dofs.extend(nodes.map(|node| 2 * node + 1));
     }
 
@@ -236,7 +299,12 @@ impl Pile {
         (sum > 0.0).then_some(sum)
     }
 
-    /// The pile in a state; `None` if it is absent.
+    /// Numbers of the groups along its shaft.
+    pub(crate) fn shaft(&self) -> &[usize] {
+        &self.parts.shaft
+    }
+
+    /// The pile in a state, without net forces; `None` if it is absent.
     pub fn state(&self, snapshot: &Snapshot<'_>) -> Option<State> {
         let Snapshot {
             groups, problem, ..
@@ -267,40 +335,58 @@ impl Pile {
         let split = Split::new(geometry, &held, outer);
         let weight: f64 = weights.iter().map(|(_, weight)| weight).sum();
         let y = |node: &usize| snapshot.displacement[2 * node + 1];
-        let settlements: Vec<f64> = geometry
-            .settle
-            .iter()
-            .map(|nodes| -nodes.iter().map(y).sum::<f64>() / nodes.len().max(1) as f64)
-            .collect();
+        let settlement =
+            |nodes: &[usize]| -nodes.iter().map(y).sum::<f64>() / nodes.len().max(1) as f64;
         let loads = Loads {
             head: split.head,
             shaft: split.shaft,
             base: split.base,
-            settlement: settlements[0],
+            settlement: settlement(&geometry.rows[0].nodes),
             weight,
         };
-        let stations = geometry.stations.iter().zip(settlements).enumerate();
-        let last = geometry.stations.len() - 1;
-        let station = |(number, (&z, settlement)): (usize, (&f64, f64))| {
+        let along = friction::along(snapshot, geometry, &split);
+        let last = geometry.rows.len() - 1;
+        let station = |(number, row): (usize, &Row)| {
+            let z = row.z;
             let axial_force = match number {
                 0 => loads.head,
                 _ if number == last => loads.base,
                 _ => {
-                    loads.head + self.weight_above(snapshot, &weights, z) - split.above(z, snapshot)
+                    let above = split.above(z, snapshot) + self.bend(row, &along);
+                    loads.head + self.weight_above(snapshot, &weights, z) - above
                 }
             };
-            let [shaft_friction, normal_stress, slip] = self.at(snapshot, &split, z);
+            let mut parts = row.at.iter();
+            let held = parts.find_map(|&(span, part)| along[span].map(|held| held[part]));
             Station {
                 z,
                 axial_force,
-                shaft_friction,
-                normal_stress,
-                slip,
-                settlement,
+                shaft_friction: held.map(|held| held[0]),
+                normal_stress: held.map(|held| held[1]),
+                slip: held.map(|held| held[2]),
+                settlement: settlement(&row.nodes),
+                axial_force_net: None,
+                shaft_friction_net: None,
             }
         };
-        let stations = stations.map(station).collect();
-        Some(State { loads, stations })
+        let stations: Vec<Station> = geometry.rows.iter().enumerate().map(station).collect();
+        Some(State {
+            loads,
+            net: None,
+            downdrag: Downdrag::of(&geometry.spans, &geometry.rows, &stations),
+            stations,
+        })
+    }
+
+    /// What the upper half of an element holds more than the lower, halved, in its middle: friction is a parabola
+    /// there.
+    fn bend(&self, row: &Row, along: &[Option<[friction::Skin; 3]>]) -> f64 {
+        let middle = row.at.iter().find(|(_, part)| *part == 1);
+        let of = |&(span, _): &(usize, usize)| {
+            let [top, _, bottom] = along[span]?.map(|held| held[0]);
+            Some(self.geometry.spans[span].area * (top - bottom) / 8.0)
+        };
+        middle.and_then(of).unwrap_or(0.0)
     }
 
     /// Weight above z of groups, given the weight of all of each.
@@ -370,6 +456,7 @@ impl Pile {
                 forces: facet.nodes.map(|node| -force[2 * node + 1]),
             }));
         }
+        held.sort_unstable_by_key(|held| held.facet.number);
         held
     }
 
@@ -415,49 +502,6 @@ impl Pile {
         }
         outer
     }
-
-    /// Friction, effective normal stress (compression positive) and slip at a station: means over the
-    /// elements of the shaft there, weighted by their girth (a tube holds more outside than inside). The
-    /// value of an element is the mean at its nearest integration points.
-    fn at(&self, snapshot: &Snapshot<'_>, split: &Split<'_>, z: f64) -> [Option<f64>; 3] {
-        let close = 1e-9 * self.geometry.length();
-        let there = split.segments.iter();
-        let there = there.filter(|(facet, _)| facet.z[0] - close <= z && z <= facet.z[1] + close);
-        let mut sums = [0.0; 3];
-        let mut whole = 0.0;
-        for (facet, force) in there {
-            let group = &snapshot.groups[facet.group];
-            let height = |point: usize| (group.kinematics.position(point)[1] - z).abs();
-            let points = group.kinematics.points_of(facet.element);
-            let nearest = points.clone().map(height).fold(f64::INFINITY, f64::min);
-            let points: Vec<usize> = points
-                .filter(|&point| height(point) <= nearest + close)
-                .collect();
-            let mut own = [0.0; 3];
-            for &point in &points {
-                let values = if !group.is_active {
-                    let [normal, _] = beside(snapshot, facet, point);
-                    let at = group.kinematics.position(point);
-                    let pore = pressure_beside(snapshot, facet, at);
-                    [force / facet.area, -normal - pore, 0.0]
-                } else if let Some((jump, traction)) = group.jump_and_traction(point) {
-                    [facet.sign * traction[1], -traction[0], facet.sign * jump[1]]
-                } else {
-                    continue;
-                };
-                own.iter_mut()
-                    .zip(values)
-                    .for_each(|(own, value)| *own += value);
-            }
-            let n = points.len().max(1) as f64;
-            let girth = facet.area / f64::max(facet.z[1] - facet.z[0], close);
-            sums.iter_mut()
-                .zip(own)
-                .for_each(|(sum, own)| *sum += girth * own / n);
-            whole += girth;
-        }
-        sums.map(|sum| (whole > 0.0).then(|| sum / whole))
-    }
 }
 
 /// Total stress of the pile next to a point of an interface that is absent, on its facet: normal,
@@ -489,83 +533,4 @@ fn pressure_beside(snapshot: &Snapshot<'_>, facet: &Facet, at: [f64; 2]) -> f64 
                 .map_or(0.0, |water| water.pressure(at))
     };
     snapshot.acting.parts().into_iter().map(of).sum()
-}
-
-/// The outer forces on the pile, divided among head, shaft and base.
-struct Split<'g> {
-    head: f64,
-    shaft: f64,
-    base: f64,
-    /// Upward force of every element of the shaft.
-    segments: Vec<(&'g Facet, f64)>,
-    /// Node and upward force of all that is neither head, shaft nor base.
-    others: Vec<(usize, f64)>,
-}
-
-impl<'g> Split<'g> {
-    fn new(geometry: &'g Geometry, held: &[Held<'g>], outer: impl Fn(usize) -> f64) -> Self {
-        use std::collections::{HashMap, HashSet};
-        let head: HashSet<usize> = geometry.head.iter().copied().collect();
-        let base: HashSet<usize> = geometry.base.iter().copied().collect();
-        // Of every node of the shaft: what its elements exert, and their area.
-        let mut at_nodes: HashMap<usize, [f64; 2]> = HashMap::new();
-        for Held { facet, forces } in held {
-            for (node, force) in facet.nodes.iter().zip(forces) {
-                let at_node = at_nodes.entry(*node).or_default();
-                at_node[0] += force;
-                at_node[1] += facet.area;
-            }
-        }
-        let segment = |Held { facet, forces }: &Held<'g>| {
-            let of_node = |(node, force): (&usize, &f64)| {
-                if head.contains(node) || base.contains(node) {
-                    return *force;
-                }
-                // What the elements leave of it is shared by their areas.
-                let [sum, area] = at_nodes[node];
-                force + (outer(*node) - sum) * facet.area / area
-            };
-            (*facet, facet.nodes.iter().zip(forces).map(of_node).sum())
-        };
-        let segments: Vec<(&Facet, f64)> = held.iter().map(segment).collect();
-        let others: Vec<(usize, f64)> = geometry
-            .others
-            .iter()
-            .map(|&node| (node, outer(node)))
-            .collect();
-        let left = |node: &usize| outer(*node) - at_nodes.get(node).map_or(0.0, |[sum, _]| *sum);
-        let of_base = geometry.base.iter().filter(|node| !head.contains(node));
-        Self {
-            head: -geometry.head.iter().map(left).sum::<f64>(),
-            base: of_base.map(left).sum(),
-            shaft: segments.iter().map(|(_, force)| force).sum::<f64>()
-                + others.iter().map(|(_, force)| force).sum::<f64>(),
-            segments,
-            others,
-        }
-    }
-
-    /// What holds the pile above z, between head and base.
-    fn above(&self, z: f64, snapshot: &Snapshot<'_>) -> f64 {
-        let part = |(facet, force): &(&Facet, f64)| {
-            let [low, high] = facet.z;
-            let above = if high > low {
-                ((high - z) / (high - low)).clamp(0.0, 1.0)
-            } else {
-                f64::from(high > z)
-            };
-            // Stations stand at the ends of elements, but for round-off.
-            let above = if above < 1e-9 {
-                0.0
-            } else if above > 1.0 - 1e-9 {
-                1.0
-            } else {
-                above
-            };
-            force * above
-        };
-        let others = self.others.iter();
-        let others = others.filter(|(node, _)| snapshot.mesh.nodes[*node][1] > z);
-        self.segments.iter().map(part).sum::<f64>() + others.map(|(_, force)| force).sum::<f64>()
-    }
 }

@@ -12,7 +12,7 @@ use crate::leftovers;
 use crate::log_file::LogFile;
 use crate::mesh_error::OfPhase;
 use crate::output_request::{Output, OutputRequest, When};
-use crate::pile::{Curve as PileCurve, Pile, Resistances, State as PileState, Stations};
+use crate::pile::{self, Record as PileRecord, Resistances, State as PileState};
 use crate::points::Points;
 use crate::probe::{Probes, Sizes};
 use crate::profile::Profile;
@@ -39,7 +39,7 @@ pub struct Recorder {
     history: Table,
     path: Option<Table>,
     profile: Option<Profile>,
-    pile: Option<OfPile>,
+    pile: Option<PileRecord>,
     points: Option<Points>,
     fields: Option<Fields>,
     log: LogFile,
@@ -48,25 +48,13 @@ pub struct Recorder {
     seconds: Duration,
 }
 
-/// A pile, as it is written.
-#[derive(Debug)]
-struct OfPile {
-    pile: Pile,
-    stations: Stations,
-    curve: PileCurve,
-    /// Phases that settlements are counted from.
-    resets: Vec<String>,
-    /// Phases before the pile is in place.
-    too_early: Vec<String>,
-}
-
 /// How far the results of a run had come at a checkpoint.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct ResultsState {
     history: Extent,
     path: Option<Extent>,
     profile: Option<Extent>,
-    pile: Option<(Extent, PileCurve)>,
+    pile: Option<pile::Kept>,
     points: Option<Extent>,
     log: Extent,
     fields: Option<Vec<Written>>,
@@ -85,7 +73,7 @@ impl ResultsState {
             ("history.csv", Some(self.history)),
             ("path.csv", self.path),
             ("profile.csv", self.profile),
-            ("pile.csv", self.pile.as_ref().map(|(extent, _)| *extent)),
+            ("pile.csv", self.pile.as_ref().map(|pile| pile.table)),
             ("points.csv", self.points),
             ("log.jsonl", Some(self.log)),
         ];
@@ -210,12 +198,6 @@ impl Recorder {
             .transpose()?;
         let from = at.and_then(|state| state.profile);
         let profile = Profile::begin(folder, settings.profile, simulation, from)?;
-        let from = at.and_then(|state| Some(state.pile.as_ref()?.0));
-        let stations = wanted
-            .pile
-            .as_ref()
-            .map(|_| Stations::begin(folder, from))
-            .transpose()?;
         let from = at.and_then(|state| state.points);
         let points = Points::begin(folder, settings.points, simulation, from)?;
         let mut looked_at = wanted.probes.looks_at(simulation);
@@ -223,26 +205,17 @@ impl Recorder {
             pile.looks_at(&mut looked_at, simulation);
         }
         let history = Table::begin(folder.join("history.csv"), columns, history_from)?;
-        let resets = simulation
-            .problem()
-            .phases
-            .iter()
-            .filter(|phase| phase.reset_displacements);
-        let resets: Vec<String> = resets.map(|phase| phase.name.clone()).collect();
         let summary = Progress::new(about, &wanted, simulation);
         let figures = empty_figures(&wanted);
-        let of_pile = |(pile, stations): (Pile, Stations)| OfPile {
-            too_early: pile.phases_too_early(simulation.problem()),
-            pile,
-            stations,
-            curve: PileCurve::default(),
-            resets,
-        };
+        let from = at.and_then(|state| state.pile.as_ref());
+        let pile = wanted
+            .pile
+            .map(|pile| PileRecord::begin(pile, folder, simulation, from));
         let mut results = Self {
             history,
             path,
             profile,
-            pile: wanted.pile.zip(stations).map(of_pile),
+            pile: pile.transpose()?,
             points,
             fields: Fields::create(folder, settings, simulation),
             log,
@@ -258,9 +231,6 @@ impl Recorder {
             results.summary.course = state.course;
             results.figures.restore(state.curves);
             results.seconds = state.seconds;
-            if let (Some(pile), Some((_, curve))) = (&mut results.pile, state.pile) {
-                pile.curve = curve;
-            }
             if let (Some(fields), Some(written)) = (&mut results.fields, state.fields) {
                 fields.written = written;
             }
@@ -281,10 +251,7 @@ impl Recorder {
         let path = self.path.as_ref().map(Table::sync);
         let profile = self.profile.as_ref().map(|profile| profile.table.sync());
         let points = self.points.as_ref().map(|points| points.table.sync());
-        let pile = self.pile.as_ref().map(|pile| {
-            let extent = pile.stations.table.sync()?;
-            Ok::<_, Error>((extent, pile.curve.clone()))
-        });
+        let pile = self.pile.as_ref().map(PileRecord::kept);
         Ok(ResultsState {
             history: self.history.sync()?,
             path: path.transpose()?,
@@ -363,12 +330,20 @@ impl Recorder {
         iterations: usize,
         snapshot: &Snapshot<'_>,
     ) -> Result<(), Fault> {
+        self.begins(place, snapshot);
         let (probes, _) = self.values(place, snapshot)?;
         let Some(path) = &mut self.path else {
             return Ok(());
         };
         path.row(history_row(place, load_factor, &probes, iterations));
         Ok(path.flush()?)
+    }
+
+    /// A state of this place's phase is about to be looked at.
+    fn begins(&mut self, place: &Place, snapshot: &Snapshot<'_>) {
+        if let Some(pile) = &mut self.pile {
+            pile.begins(place, snapshot);
+        }
     }
 
     /// Values of the probes and of the pile, and the pile along its length.
@@ -389,12 +364,12 @@ impl Recorder {
 
     fn values_of(&self, snapshot: &Snapshot<'_>) -> (Vec<Option<f64>>, Option<PileState>) {
         let mut values = self.probes.values(snapshot);
-        let Some(of_pile) = &self.pile else {
+        let Some(pile) = &self.pile else {
             return (values, None);
         };
-        let state = of_pile.pile.state(snapshot);
-        let loads = state.as_ref().map(|state| state.loads.values());
-        values.extend((0..crate::pile::COLUMNS.len()).map(|c| loads.map(|loads| loads[c])));
+        let state = pile.state(snapshot);
+        let of_pile = state.as_ref().map(PileState::values);
+        values.extend(of_pile.unwrap_or_default());
         (values, state)
     }
 
@@ -403,7 +378,7 @@ impl Recorder {
         let of = Sizes::of(snapshot);
         let mut sizes = self.probes.sizes(snapshot, &of);
         if self.pile.is_some() {
-            sizes.extend(crate::pile::sizes(&of));
+            sizes.extend(pile::sizes(&of));
         }
         let known = &mut self.summary.course.sizes;
         known.resize(sizes.len(), 0.0);
@@ -424,6 +399,7 @@ impl Recorder {
         time: f64,
         snapshot: &Snapshot<'_>,
     ) -> Result<(), Error> {
+        self.begins(place, snapshot);
         self.summary.course.stopped = Some(Stopped {
             phase: place.phase.clone(),
             load_factor,
@@ -450,6 +426,7 @@ impl Recorder {
         let Increment {
             place, of, time, ..
         } = increment;
+        self.begins(place, snapshot);
         let (probes, pile) = self.values(place, snapshot)?;
         let start = Instant::now();
         self.history
@@ -460,20 +437,11 @@ impl Recorder {
         {
             profile.write(place, snapshot)?;
         }
-        if let Some(of_pile) = &mut self.pile
-            && let Some(state) = pile
-        {
-            of_pile.stations.write(place, &state)?;
-            self.figures.along_pile(place, *of, &state.stations);
-            if of_pile.curve.begins(&place.phase) {
-                let resets = of_pile.resets.contains(&place.phase);
-                let is_in_place = !of_pile.too_early.contains(&place.phase);
-                let stiffness = of_pile.pile.stiffness(snapshot.groups);
-                of_pile
-                    .curve
-                    .phase(&place.phase, [resets, is_in_place], stiffness);
-            }
-            of_pile.curve.add(&state.loads);
+        if let Some(of_pile) = &mut self.pile {
+            of_pile.add(place, pile.as_ref(), snapshot)?;
+        }
+        if let (Some(of_pile), Some(state)) = (&self.pile, &pile) {
+            self.figures.along_pile(place, *of, (state, of_pile.unit()));
         }
         if self.settings.points.includes(place.increment, *of)
             && let Some(points) = &mut self.points
@@ -524,8 +492,12 @@ impl Recorder {
 
     /// Resistances of the pile, if there is one.
     pub fn resistances(&self) -> Option<Resistances> {
-        let of_pile = self.pile.as_ref()?;
-        Some(of_pile.curve.resistances(&of_pile.pile))
+        self.pile.as_ref().map(PileRecord::resistances)
+    }
+
+    /// A warning if much of a pile's settlement is elastic slip of its joints.
+    pub fn soft_shaft(&self) -> Option<String> {
+        self.pile.as_ref().and_then(PileRecord::soft_shaft)
     }
 
     /// The error of the mesh at the end of the last phase, in words, if it was asked for.
@@ -572,10 +544,12 @@ impl Recorder {
             .summary
             .finish(groups, [total, self.seconds], warnings, ending);
         summary.pile = self.resistances().map(|found| found.summary());
+        let of_pile = self.pile.as_ref();
+        let cycles = of_pile.map_or(Ok(()), |pile| pile.finish(&self.folder));
         let logged = self.log.end(&ending.status);
         // A log that takes no more must not leave a run that seems to go on.
         summary::write(&self.folder, summary)?;
-        logged.and(drawn)
+        logged.and(cycles).and(drawn)
     }
 }
 

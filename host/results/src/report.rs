@@ -30,6 +30,7 @@ use crate::summary;
 use crate::summary::About;
 use budget::Budget;
 use mechanics::Simulation;
+use page::For;
 use results::Run;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -89,14 +90,14 @@ impl Running {
             return Ok(());
         }
         let now = SystemTime::now().duration_since(UNIX_EPOCH);
-        let now = Some(now.map_or(0, |since| since.as_secs()));
+        let now = now.map_or(0, |since| since.as_secs());
         let text = if crate::study::is_study(&self.folder) {
-            study::render(&self.folder, now)?
+            study::render(&self.folder, Some(now))?
         } else {
             page::render(
                 &read(std::slice::from_ref(&self.folder), None)?,
                 &self.folder,
-                now,
+                For::Running(now),
             )?
         };
         replace_whole(&self.folder.join(FILE), text)?;
@@ -137,7 +138,7 @@ pub fn write_dry(
     }
     let run = Run::before(folder, about, wanted, simulation, warnings);
     std::fs::create_dir_all(folder).map_err(|error| Error::unwritable(folder, error))?;
-    let text = page::render(&[run], folder, None)?;
+    let text = page::render(&[run], folder, For::Screen)?;
     let file = folder.join(FILE);
     replace_whole(&file, text)?;
     Ok(file)
@@ -173,7 +174,15 @@ fn read(folders: &[PathBuf], known: Option<Known>) -> Result<Vec<Run>, Error> {
 /// [`Error::Usage`] without a folder, or if one has no results; [`Error::Unreadable`] if one has no `history.csv`,
 /// [`Error::Input`] if that is not the history of a run; [`Error::Unwritable`].
 pub fn write(folders: &[PathBuf], out: &Path) -> Result<PathBuf, Error> {
-    write_as(folders, out, None)
+    write_as(folders, out, None, For::Screen)
+}
+
+/// Writes a report for paper, as [`write()`].
+///
+/// # Errors
+/// As [`write()`]; [`Error::Usage`] for a study, whose report is for a screen.
+pub fn write_for_paper(folders: &[PathBuf], out: &Path) -> Result<PathBuf, Error> {
+    write_as(folders, out, None, For::Paper)
 }
 
 /// Writes the report of a run into its folder, as [`write()`], by the process that wrote the results.
@@ -182,10 +191,15 @@ pub fn write(folders: &[PathBuf], out: &Path) -> Result<PathBuf, Error> {
 /// As [`write()`].
 pub fn write_of(folder: &Path, known: Known) -> Result<PathBuf, Error> {
     let folders = [folder.to_owned()];
-    write_as(&folders, &default_path(&folders), Some(known))
+    write_as(&folders, &default_path(&folders), Some(known), For::Screen)
 }
 
-fn write_as(folders: &[PathBuf], out: &Path, known: Option<Known>) -> Result<PathBuf, Error> {
+fn write_as(
+    folders: &[PathBuf],
+    out: &Path,
+    known: Option<Known>,
+    kind: For,
+) -> Result<PathBuf, Error> {
     if folders.is_empty() {
         return Err(Error::Usage("name at least one results folder".to_owned()));
     }
@@ -217,8 +231,13 @@ fn write_as(folders: &[PathBuf], out: &Path, known: Option<Known>) -> Result<Pat
     let parent = absolute.parent().unwrap_or(&absolute);
     std::fs::create_dir_all(parent).map_err(unwritable)?;
     let text = match study {
+        Some(_) if matches!(kind, For::Paper) => {
+            return Err(Error::Usage(
+                "the report of a study is for a screen: `--print` takes folders of runs".to_owned(),
+            ));
+        }
         Some(folder) => study::render(folder, None)?,
-        None => page::render(&read(folders, known)?, parent, None)?,
+        None => page::render(&read(folders, known)?, parent, kind)?,
     };
     // A name that was asked for is followed, as a shell does.
     if is_ours {

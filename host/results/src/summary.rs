@@ -71,6 +71,8 @@ pub(crate) struct Head {
     pub(crate) accuracy: Option<Value>,
     pub(crate) figures: Vec<Figure>,
     pub(crate) pictures: Vec<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) pile_section: Option<Section>,
     pub(crate) probe_units: Named<Option<String>>,
     pub(crate) laws: Named<Law>,
     pub(crate) mesh: Mesh,
@@ -136,6 +138,37 @@ pub(crate) struct Figure {
     pub(crate) x_label: Option<String>,
     pub(crate) y: Vec<String>,
     pub(crate) y_label: Option<String>,
+    #[serde(skip_serializing_if = "is_false")]
+    pub(crate) y_reversed: bool,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "as serde calls it")]
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
+/// A pile in the ground, for pictures; heights and widths in m.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Section {
+    pub(crate) bottom: f64,
+    /// From above.
+    pub(crate) layers: Vec<Layer>,
+    /// Phases that settlements and net loads are counted from.
+    pub(crate) resets: Vec<String>,
+    pub(crate) top: f64,
+    /// Height of the water table by phase.
+    pub(crate) water: Vec<(String, f64)>,
+    pub(crate) width: f64,
+}
+
+/// A layer of the ground beside a pile.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Layer {
+    pub(crate) bottom: f64,
+    pub(crate) group: String,
+    pub(crate) top: f64,
 }
 
 /// Measured points by coordinate.
@@ -305,7 +338,7 @@ pub(crate) struct Stop {
     pub(crate) probes: Named<Option<f64>>,
 }
 
-/// Resistances of a pile, each with the reason where there is none; the page has its fields in this
+/// Resistances of a pile, net loads, each with the reason where there is none; the page has its fields in this
 /// order.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default)]
@@ -314,19 +347,47 @@ pub(crate) struct Resistances {
     pub(crate) diameter: Option<f64>,
     pub(crate) phase: Option<String>,
     pub(crate) resistance_10_percent_diameter: Option<f64>,
+    pub(crate) resistance_10_percent_diameter_base: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) resistance_10_percent_diameter_phase: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) resistance_10_percent_diameter_reason: Option<String>,
+    pub(crate) resistance_10_percent_diameter_shaft: Option<f64>,
     pub(crate) resistance_chin: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) resistance_chin_reason: Option<String>,
     pub(crate) resistance_davisson: Option<f64>,
+    pub(crate) resistance_davisson_base: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) resistance_davisson_phase: Option<String>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) resistance_davisson_reason: Option<String>,
+    pub(crate) resistance_davisson_shaft: Option<f64>,
     pub(crate) shaft_at_10_percent_diameter: Option<f64>,
-    /// Settlement, and loads of head, shaft and base, that its curve starts from.
+    /// Settlement, and gross loads of head, shaft and base, that the curve of `phase` starts from.
     pub(crate) start: Option<[f64; 4]>,
     pub(crate) unit: String,
+    pub(crate) uplift_10_percent_diameter: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) uplift_10_percent_diameter_phase: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) uplift_10_percent_diameter_reason: Option<String>,
+    pub(crate) uplift_davisson: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) uplift_davisson_phase: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) uplift_davisson_reason: Option<String>,
     pub(crate) weight: Option<f64>,
+}
+
+/// What is told of a criterion.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Criterion {
+    pub(crate) load: Option<f64>,
+    pub(crate) shaft: Option<f64>,
+    pub(crate) base: Option<f64>,
+    pub(crate) phase: Option<String>,
+    pub(crate) reason: Option<String>,
 }
 
 /// In total, and for output.

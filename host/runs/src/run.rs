@@ -338,7 +338,8 @@ impl Follower<'_> {
     fn follow(&mut self, case: &Case, simulation: &mut Simulation) -> Result<(), Error> {
         let outcome = simulation.run(self);
         let (beyond, unreliable) = (simulation.beyond_theory(), self.results.unreliable());
-        for warning in beyond.iter().chain(&unreliable) {
+        let soft = self.results.soft_shaft();
+        for warning in beyond.iter().chain(&unreliable).chain(&soft) {
             self.say(warning);
         }
         let outcome = outcome.map_err(|error| {

@@ -132,7 +132,7 @@ impl Ended {
             keep_last(&mut self.unwritten, error.into());
         }
         if self.folders.len() > 1
-            && let Err(error) = write_report(&self.folders, Some(together))
+            && let Err(error) = write_report(&self.folders, Some(together), false)
         {
             keep_last(&mut self.unwritten, error);
         }
@@ -187,9 +187,18 @@ fn keep_last(failure: &mut Option<Error>, error: Error) {
 }
 
 /// Writes the report of a run, or the comparison of several.
-pub(super) fn write_report(folders: &[PathBuf], out: Option<PathBuf>) -> Result<(), Error> {
+pub(super) fn write_report(
+    folders: &[PathBuf],
+    out: Option<PathBuf>,
+    for_paper: bool,
+) -> Result<(), Error> {
     let out = out.unwrap_or_else(|| report::default_path(folders));
-    say_written(&report::write(folders, &out)?);
+    let write = if for_paper {
+        report::write_for_paper
+    } else {
+        report::write
+    };
+    say_written(&write(folders, &out)?);
     Ok(())
 }
 

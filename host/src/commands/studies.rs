@@ -121,7 +121,7 @@ fn all(plan: &Plan, jobs: &Jobs, stop: &Stop) -> Result<(), Error> {
         "table in {}\n",
         folder.join(results::study::TABLE).display()
     ))?;
-    write_report(&[PathBuf::from(folder)], None)?;
+    write_report(&[PathBuf::from(folder)], None, false)?;
     let unfinished = rows.iter().filter(|row| !row.standing.state.is_final());
     match unfinished.count() {
         0 => Ok(()),

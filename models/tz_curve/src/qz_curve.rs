@@ -40,7 +40,7 @@ impl InterfaceLaw for QzCurve {
     const DESCRIPTION: Description = abi::describe! {
         id: "qz_curve",
         name: "q-z curve of Frank and Zhao",
-        doc: "Pressure on a base from the pressuremeter modulus, in two slopes up to its limit, gap in \
+        doc: "Load transfer curve of a base from the pressuremeter modulus, in two slopes up to its limit, gap in \
               tension.",
         references: "Frank & Zhao 1982, Bull. liaison Labo. P. et Ch. 119",
     };

@@ -37,7 +37,7 @@ impl InterfaceLaw for TzCurve {
     const DESCRIPTION: Description = abi::describe! {
         id: "tz_curve",
         name: "t-z curve of Frank and Zhao",
-        doc: "Shaft friction from the pressuremeter modulus, in two slopes up to its limit, whatever the \
+        doc: "Load transfer curve of a shaft from the pressuremeter modulus, in two slopes up to its limit, whatever the \
               normal stress.",
         references: "Frank & Zhao 1982, Bull. liaison Labo. P. et Ch. 119",
     };

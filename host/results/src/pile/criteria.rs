@@ -1,6 +1,6 @@
 //! The resistance of a pile by its load–settlement curve.
 
-use super::{Loads, Pile};
+use super::{Loads, Pile, State};
 use crate::summary;
 use serde::{Deserialize, Serialize};
 
@@ -11,63 +11,107 @@ const OFFSET: [f64; 2] = [0.0038, 1.0 / 120.0];
 const LAST: f64 = 0.5;
 const EXPLAINED: f64 = 0.98;
 const FEWEST: usize = 4;
+/// Elastic slip of joints above this share of the settlement changes the result.
+const SLIP: f64 = 0.1;
 
-/// The course of the pile's loads in a phase.
+/// The course of the pile's loads in a phase; loads are net ones.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct OfPhase {
-    phase: String,
+    pub(crate) phase: String,
     /// Settlements are counted from its start.
-    resets: bool,
+    pub(crate) resets: bool,
     /// The pile is in place: its interfaces are active and its law is that of the pile.
-    is_in_place: bool,
+    pub(crate) is_in_place: bool,
     /// E A of the head's section, kN.
     stiffness: Option<f64>,
     weight: f64,
-    /// Settlement, head, shaft and base load.
-    points: Vec<[f64; 4]>,
+    /// Settlement, and gross loads of head, shaft and base, before its first increment.
+    gross_start: Option<[f64; 4]>,
+    /// Settlement, head, shaft and base load before its first increment.
+    start: [f64; 4],
+    /// After each increment.
+    pub(crate) points: Vec<[f64; 4]>,
+    /// Elastic slip of the shaft's joints after each increment, m.
+    slips: Vec<Option<f64>>,
+}
+
+impl OfPhase {
+    pub(crate) fn start(&self) -> [f64; 4] {
+        self.start
+    }
+
+    /// The curve from its start, in a direction of the head (1 down, −1 up).
+    fn curve(&self, direction: f64) -> Vec<[f64; 4]> {
+        let points = std::iter::once(&self.start).chain(&self.points);
+        points.map(|point| point.map(|v| direction * v)).collect()
+    }
 }
 
 /// Course of a pile's loads through all phases.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Curve(Vec<OfPhase>);
+pub struct Curve {
+    phases: Vec<OfPhase>,
+    /// The gross loads after the last increment.
+    last: Option<[f64; 4]>,
+}
 
 /// A resistance, or why none exists.
-type Found = Result<f64, String>;
+type Found = Result<Criterion, String>;
 
-/// The resistances of a pile, loads of its head in kN.
+/// A resistance by a criterion: forces of its direction, kN, net.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Criterion {
+    /// The last phase that reaches it.
+    pub phase: String,
+    /// Of the head.
+    pub head: f64,
+    /// Of it the shaft's.
+    pub shaft: f64,
+    /// Of it the base's.
+    pub base: f64,
+}
+
+/// The resistances of a pile, net loads of its head in kN.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Resistances {
-    /// The phase whose curve it is.
+    /// The last phase that pushes the head down.
     pub phase: Option<String>,
     /// Unit of the loads.
     pub unit: &'static str,
     /// Diameter, m.
     pub diameter: f64,
-    /// At a settlement of 10 % of the diameter: head, shaft, base.
-    pub ten_percent: Result<[f64; 3], String>,
+    /// At a settlement of 10 % of the diameter.
+    pub ten_percent: Found,
     /// By Davisson's offset line.
     pub davisson: Found,
     /// By Chin's inverse slope.
-    pub chin: Found,
-    /// Settlement, head, shaft and base load where the phase starts.
+    pub chin: Result<f64, String>,
+    /// At a heave of 10 % of the diameter.
+    pub uplift_ten_percent: Found,
+    /// By Davisson's offset line.
+    pub uplift_davisson: Found,
+    /// Settlement, and gross loads of head, shaft and base, where the phase starts.
     start: Option<[f64; 4]>,
     /// Weight of the pile, kN.
     weight: Option<f64>,
 }
 
-/// The last phase in which the head moves down.
-struct Push<'c> {
-    phase: &'c OfPhase,
-    /// The state that it starts from.
-    start: [f64; 4],
-    /// The curve to its end, from where settlements are counted.
-    points: Vec<[f64; 4]>,
+/// A pile as criteria see it.
+#[derive(Clone, Copy, Debug)]
+struct Measures {
+    length: f64,
+    diameter: f64,
+    unit: &'static str,
 }
 
 impl Curve {
     /// Whether the next increment is the first of its phase.
     pub(crate) fn begins(&self, phase: &str) -> bool {
-        self.0.last().is_none_or(|last| last.phase != phase)
+        self.phases.last().is_none_or(|last| last.phase != phase)
+    }
+
+    pub(crate) fn phases(&self) -> impl Iterator<Item = &OfPhase> + Clone {
+        self.phases.iter()
     }
 
     pub(crate) fn phase(
@@ -76,79 +120,108 @@ impl Curve {
         [resets, is_in_place]: [bool; 2],
         stiffness: Option<f64>,
     ) {
-        self.0.push(OfPhase {
+        let before = self.phases.last();
+        let before = before.map(|last| last.points.last().copied().unwrap_or(last.start));
+        let start = before.filter(|_| !resets).unwrap_or_default();
+        let mut gross_start = self.last;
+        if let Some([settlement, ..]) = gross_start.as_mut().filter(|_| resets) {
+            *settlement = 0.0;
+        }
+        self.phases.push(OfPhase {
             phase: phase.to_owned(),
             resets,
             is_in_place,
             stiffness,
+            gross_start,
+            start,
             ..OfPhase::default()
         });
     }
 
-    pub(crate) fn add(&mut self, loads: &Loads) {
-        if let Some(last) = self.0.last_mut() {
-            let [head, shaft, base, settlement] = loads.values();
-            last.weight = loads.weight;
-            last.points.push([settlement, head, shaft, base]);
+    pub(crate) fn add(&mut self, state: &State, elastic_slip: Option<f64>) {
+        let Loads {
+            settlement, weight, ..
+        } = state.loads;
+        let of = |[head, shaft, base]: [f64; 3]| [settlement, head, shaft, base];
+        self.last = Some(of(state.loads.of_parts()));
+        if let Some(phase) = self.phases.last_mut() {
+            phase.weight = weight;
+            if let Some(net) = state.net {
+                phase.points.push(of(net));
+                phase.slips.push(elastic_slip);
+            }
         }
     }
 
-    /// The last phase in which the head moves down, if there is one.
-    fn last_push(&self) -> Option<Push<'_>> {
-        let before = |number: usize| -> Option<[f64; 4]> {
-            let last = self.0[..number]
-                .iter()
-                .rev()
-                .find_map(|phase| phase.points.last());
-            last.copied()
+    /// The phases with the pile in place, the last first.
+    fn in_place(&self) -> impl Iterator<Item = &OfPhase> {
+        self.phases.iter().rev().filter(|phase| phase.is_in_place)
+    }
+
+    /// The last phase that ends with the head lower than it began.
+    fn last_push(&self) -> Option<&OfPhase> {
+        let moves = |phase: &&OfPhase| {
+            let end = phase.points.last();
+            end.is_some_and(|end| end[0] > phase.start[0])
         };
-        let start = |number: usize| {
-            if self.0[number].resets {
-                0.0
-            } else {
-                before(number).map_or(0.0, |point| point[0])
+        self.in_place().find(moves)
+    }
+
+    /// The curve from the last reset to the end of a phase.
+    fn since_reset(&self, of: &OfPhase) -> Vec<[f64; 4]> {
+        let end = self.phases.iter().position(|phase| phase == of);
+        let until = &self.phases[..=end.unwrap_or(0)];
+        let first = until.iter().rposition(|phase| phase.resets).unwrap_or(0);
+        let points = until[first..].iter().flat_map(|phase| &phase.points);
+        std::iter::once(&until[first].start)
+            .chain(points)
+            .copied()
+            .collect()
+    }
+
+    /// The last phase whose curve in a direction reaches a criterion: `find` gives its load there, or what is missing.
+    /// The reason is that of the phase which moves the head farthest.
+    fn last_to_reach(
+        &self,
+        direction: f64,
+        find: impl Fn(&OfPhase, &[[f64; 4]]) -> Result<[f64; 4], String>,
+    ) -> Found {
+        let mut farthest: Option<(f64, String)> = None;
+        for phase in self.in_place() {
+            let curve = phase.curve(direction);
+            let most = largest(&curve);
+            if most <= curve[0][0] {
+                continue;
             }
-        };
-        let moves = |number: &usize| {
-            let OfPhase {
-                points,
-                is_in_place,
-                ..
-            } = &self.0[*number];
-            *is_in_place && points.last().is_some_and(|end| end[0] > start(*number))
-        };
-        let number = (0..self.0.len()).rev().find(moves)?;
-        let first = (0..=number).rev().find(|&n| self.0[n].resets).unwrap_or(0);
-        let mut points =
-            vec![before(first).map_or([0.0; 4], |[_, head, shaft, base]| [0.0, head, shaft, base])];
-        points.extend(
-            self.0[first..=number]
-                .iter()
-                .flat_map(|phase| &phase.points),
-        );
-        let own = if first == number {
-            points[0]
-        } else {
-            before(number).unwrap_or(points[0])
-        };
-        Some(Push {
-            phase: &self.0[number],
-            start: own,
-            points,
-        })
+            match find(phase, &curve) {
+                Ok([_, head, shaft, base]) => {
+                    return Ok(Criterion {
+                        phase: phase.phase.clone(),
+                        head,
+                        shaft,
+                        base,
+                    });
+                }
+                Err(why) if farthest.as_ref().is_none_or(|(other, _)| most > *other) => {
+                    farthest = Some((most, why));
+                }
+                Err(_) => {}
+            }
+        }
+        let way = if direction > 0.0 { "down" } else { "up" };
+        Err(farthest.map_or_else(
+            || format!("the head moves {way} in no phase with the pile in place"),
+            |(_, why)| why,
+        ))
     }
 
     /// How far the last phase pulls the head up, and with which force, if it does.
     fn uplift(&self, unit: &str) -> Option<String> {
-        let (last, before) = self.0.split_last()?;
-        let start = before.iter().rev().find_map(|phase| phase.points.last());
-        let start = start.filter(|_| !last.resets).map_or(0.0, |point| point[0]);
+        let last = self.phases.last()?;
         let end = last.points.last()?[0];
-        let force = last
-            .points
-            .iter()
-            .map(|point| -point[1])
-            .fold(0.0, f64::max);
+        let force = last.points.iter().map(|point| -point[1]);
+        let force = force.fold(0.0, f64::max);
+        let start = last.start[0];
         (end < start && force > 0.0).then(|| {
             format!(
                 "phase `{}` pulls the head up by {:.4} m, with at most {force:.1} {unit}",
@@ -158,50 +231,82 @@ impl Curve {
         })
     }
 
-    /// Resistances of a pile with this course.
-    pub fn resistances(&self, pile: &Pile) -> Resistances {
-        self.of(
-            [pile.length(), pile.diameter()],
-            pile.geometry.analysis.force_unit(),
-        )
+    /// A warning if elastic slip of the shaft's joints is a notable part of the settlement at half of the largest load,
+    /// in the last phase where the head moves away from where it was.
+    pub(super) fn soft_shaft(&self) -> Option<String> {
+        let phase = self.in_place().find(|phase| {
+            let away = phase.points.iter().map(|point| point[0] - phase.start[0]);
+            away.fold(0.0, |m: f64, v| m.max(v.abs())) > 0.0
+                && phase.slips.iter().any(Option::is_some)
+        })?;
+        let largest = phase.points.iter().fold(0.0, |m: f64, p| m.max(p[1].abs()));
+        let at = phase
+            .points
+            .iter()
+            .position(|point| point[1].abs() >= 0.5 * largest)?;
+        let ([settlement, load, ..], slip) = (phase.points[at], phase.slips[at]?);
+        let share = slip.abs() / settlement.abs();
+        (share > SLIP && settlement != 0.0).then(|| {
+            format!(
+                "[pile]: in phase `{}` elastic slip of the shaft's joints is {:.2} mm of {:.2} mm, {:.0} % of the settlement at \
+                 a head load of {:.1}: raise the `shear_stiffness` of their laws, until this is less than {:.0} %",
+                phase.phase,
+                1e3 * slip.abs(),
+                1e3 * settlement.abs(),
+                100.0 * share,
+                load,
+                100.0 * SLIP
+            )
+        })
     }
 
-    fn of(&self, [length, diameter]: [f64; 2], unit: &'static str) -> Resistances {
-        let Some(Push {
-            phase,
-            start,
-            points,
-        }) = self.last_push()
-        else {
-            let why = self.uplift(unit).unwrap_or_else(|| {
-                "the head moves down in no phase with the pile in place".to_owned()
-            });
-            return Resistances {
-                phase: None,
-                unit,
-                diameter,
-                ten_percent: Err(why.clone()),
-                davisson: Err(why.clone()),
-                chin: Err(why),
-                start: None,
-                weight: self.0.last().map(|last| last.weight),
-            };
+    /// Resistances of a pile with this course.
+    pub fn resistances(&self, pile: &Pile) -> Resistances {
+        self.of(Measures {
+            length: pile.length(),
+            diameter: pile.diameter(),
+            unit: pile.geometry.analysis.force_unit(),
+        })
+    }
+
+    fn of(&self, pile: Measures) -> Resistances {
+        let Measures {
+            length,
+            diameter,
+            unit,
+        } = pile;
+        let at_ten_percent = |direction: f64| {
+            self.last_to_reach(direction, |_, curve| {
+                ten_percent(curve, diameter, direction)
+            })
         };
+        let by_davisson = |direction: f64| {
+            self.last_to_reach(direction, |phase, curve| {
+                let stiffness = phase
+                    .stiffness
+                    .ok_or("the law of the pile's head has no elastic operator")?;
+                let origin = direction * self.since_reset(phase)[0][1];
+                davisson(curve, origin, length / stiffness, diameter)
+            })
+        };
+        let with_uplift = |why: String| match self.uplift(unit) {
+            Some(uplift) => format!("{why}; {uplift}"),
+            None => why,
+        };
+        let push = self.last_push();
         Resistances {
-            phase: Some(phase.phase.clone()),
+            phase: push.map(|phase| phase.phase.clone()),
             unit,
             diameter,
-            ten_percent: ten_percent(&points, diameter).map_err(|why| match self.uplift(unit) {
-                Some(uplift) => format!("{why}; {uplift}"),
-                None => why,
-            }),
-            davisson: phase
-                .stiffness
-                .ok_or_else(|| "the law of the pile's head has no elastic operator".to_owned())
-                .and_then(|stiffness| davisson(&points, length / stiffness, diameter)),
-            chin: chin(&points),
-            start: Some(start),
-            weight: Some(phase.weight),
+            ten_percent: at_ten_percent(1.0).map_err(with_uplift),
+            davisson: by_davisson(1.0),
+            chin: push
+                .ok_or_else(|| "the head moves down in no phase with the pile in place".to_owned())
+                .and_then(|phase| chin(&self.since_reset(phase))),
+            uplift_ten_percent: at_ten_percent(-1.0),
+            uplift_davisson: by_davisson(-1.0),
+            start: push.map(|phase| phase.gross_start.unwrap_or(phase.start)),
+            weight: push.or(self.phases.last()).map(|phase| phase.weight),
         }
     }
 }
@@ -209,25 +314,41 @@ impl Curve {
 impl Resistances {
     /// As in `summary.json`.
     pub(crate) fn summary(&self) -> summary::Resistances {
-        let reason = |found: &Found| found.as_ref().err().cloned();
-        let load = |found: &Found| found.as_ref().ok().copied();
-        let [head, shaft, base] = match self.ten_percent {
-            Ok(split) => split.map(Some),
-            Err(_) => [None; 3],
+        let of = |found: &Found| summary::Criterion {
+            load: found.as_ref().ok().map(|of| of.head),
+            shaft: found.as_ref().ok().map(|of| of.shaft),
+            base: found.as_ref().ok().map(|of| of.base),
+            phase: found.as_ref().ok().map(|of| of.phase.clone()),
+            reason: found.as_ref().err().cloned(),
         };
+        let [ten_percent, davisson] = [&self.ten_percent, &self.davisson].map(of);
+        let [uplift_ten_percent, uplift_davisson] =
+            [&self.uplift_ten_percent, &self.uplift_davisson].map(of);
         summary::Resistances {
-            base_at_10_percent_diameter: base,
+            base_at_10_percent_diameter: ten_percent.base,
             diameter: Some(self.diameter),
             phase: self.phase.clone(),
-            resistance_10_percent_diameter: head,
-            resistance_10_percent_diameter_reason: self.ten_percent.as_ref().err().cloned(),
-            resistance_chin: load(&self.chin),
-            resistance_chin_reason: reason(&self.chin),
-            resistance_davisson: load(&self.davisson),
-            resistance_davisson_reason: reason(&self.davisson),
-            shaft_at_10_percent_diameter: shaft,
+            resistance_10_percent_diameter: ten_percent.load,
+            resistance_10_percent_diameter_base: ten_percent.base,
+            resistance_10_percent_diameter_phase: ten_percent.phase,
+            resistance_10_percent_diameter_reason: ten_percent.reason,
+            resistance_10_percent_diameter_shaft: ten_percent.shaft,
+            resistance_chin: self.chin.as_ref().ok().copied(),
+            resistance_chin_reason: self.chin.as_ref().err().cloned(),
+            resistance_davisson: davisson.load,
+            resistance_davisson_base: davisson.base,
+            resistance_davisson_phase: davisson.phase,
+            resistance_davisson_reason: davisson.reason,
+            resistance_davisson_shaft: davisson.shaft,
+            shaft_at_10_percent_diameter: ten_percent.shaft,
             start: self.start,
             unit: self.unit.to_owned(),
+            uplift_10_percent_diameter: uplift_ten_percent.load,
+            uplift_10_percent_diameter_phase: uplift_ten_percent.phase,
+            uplift_10_percent_diameter_reason: uplift_ten_percent.reason,
+            uplift_davisson: uplift_davisson.load,
+            uplift_davisson_phase: uplift_davisson.phase,
+            uplift_davisson_reason: uplift_davisson.reason,
             weight: self.weight,
         }
     }
@@ -249,28 +370,31 @@ fn largest(points: &[[f64; 4]]) -> f64 {
     points.iter().map(|point| point[0]).fold(0.0, f64::max)
 }
 
-fn ten_percent(points: &[[f64; 4]], diameter: f64) -> Result<[f64; 3], String> {
+fn ten_percent(points: &[[f64; 4]], diameter: f64, direction: f64) -> Result<[f64; 4], String> {
     let goal = 0.1 * diameter;
     // A settlement that was asked for as such may end a last bit before.
     let reached = goal * (1.0 - 1e-9);
-    crossing(points, |[s, ..]| reached - s)
-        .map(|[_, head, shaft, base]| [head, shaft, base])
-        .ok_or_else(|| {
-            format!(
-                "the head settles by {:.6} m at most, 10 % of the diameter are {goal:.6} m",
-                largest(points)
-            )
-        })
+    crossing(points, |[s, ..]| reached - s).ok_or_else(|| {
+        let moves = if direction > 0.0 { "settles" } else { "rises" };
+        format!(
+            "the head {moves} by {:.6} m at most, 10 % of the diameter are {goal:.6} m",
+            largest(points)
+        )
+    })
 }
 
-/// `compliance`: shortening of the pile as a bar under a unit load, m/kN.
-fn davisson(points: &[[f64; 4]], compliance: f64, diameter: f64) -> Found {
-    let start = points[0][1];
+/// `origin`: load where settlements are counted from; `compliance`: shortening of the pile as a bar under a unit load,
+/// m/kN.
+fn davisson(
+    points: &[[f64; 4]],
+    origin: f64,
+    compliance: f64,
+    diameter: f64,
+) -> Result<[f64; 4], String> {
     let offset = OFFSET[0] + OFFSET[1] * diameter;
     crossing(points, |[s, head, ..]| {
-        (head - start) * compliance + offset - s
+        (head - origin) * compliance + offset - s
     })
-    .map(|point| point[1])
     .ok_or_else(|| {
         format!(
             "the curve ends at {:.6} m, before the line that is offset by {offset:.6} m",
@@ -279,7 +403,7 @@ fn davisson(points: &[[f64; 4]], compliance: f64, diameter: f64) -> Found {
     })
 }
 
-fn chin(points: &[[f64; 4]]) -> Found {
+fn chin(points: &[[f64; 4]]) -> Result<f64, String> {
     let most = largest(points);
     // Unloading and reloading are no part of the line.
     let mut deepest = 0.0;

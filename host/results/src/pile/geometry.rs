@@ -1,7 +1,7 @@
-//! The pile in a mesh: its elements, the nodes of its head and base, the faces of its shaft, and
-//! the stations along it.
+//! The pile in a mesh: its elements, the nodes of its head and base, and the faces of its shaft.
 
 use super::Parts;
+use super::rows::{Row, Span, rows};
 use mechanics::Simulation;
 use mechanics::group::Group;
 use mechanics::mesh::{Line, Mesh};
@@ -36,6 +36,8 @@ pub enum Misfit {
 /// An element of the shaft or the base, as the pile feels it.
 #[derive(Debug)]
 pub(super) struct Facet {
+    /// Its place in the list.
+    pub(super) number: usize,
     /// Number of its group, and within the group.
     pub(super) group: usize,
     pub(super) element: usize,
@@ -75,10 +77,9 @@ pub(super) struct Geometry {
     pub(super) head: Vec<usize>,
     pub(super) base: Vec<usize>,
     pub(super) shaft: Vec<Facet>,
-    /// Stations from the head down, z.
-    pub(super) stations: Vec<f64>,
-    /// By station, the pile's nodes whose settlement it has.
-    pub(super) settle: Vec<Vec<usize>>,
+    /// Its shaft from the head down, and the rows of its table.
+    pub(super) spans: Vec<Span>,
+    pub(super) rows: Vec<Row>,
     /// Nodes of the pile that are neither of head, shaft nor base, with their z.
     pub(super) others: Vec<usize>,
     /// Diameter (plane strain: width) of the base, m.
@@ -179,8 +180,8 @@ impl Geometry {
         if top <= bottom {
             return Err(Misfit::UpsideDown);
         }
-        let stations = stations([top, bottom], &shaft);
-        let settle = settle(mesh, &stations, &shaft, [&head, &base]);
+        let spans = Span::all([top, bottom], &shaft, problem);
+        let rows = rows(mesh, &spans, &shaft, [&head, &base]);
         let special: HashSet<usize> = shaft
             .iter()
             .flat_map(|facet| facet.nodes)
@@ -205,8 +206,8 @@ impl Geometry {
             head,
             base,
             shaft,
-            stations,
-            settle,
+            spans,
+            rows,
             others,
             width,
             head_sides,
@@ -217,7 +218,8 @@ impl Geometry {
 
     /// Length, m.
     pub(super) fn length(&self) -> f64 {
-        self.stations[0] - self.stations[self.stations.len() - 1]
+        let ends = self.spans.first().zip(self.spans.last());
+        ends.map_or(0.0, |(first, last)| first.z[0] - last.z[1])
     }
 
     /// Weight of a group above z, kN, with unit weights above and below a water level; `bottom`: of all
@@ -323,49 +325,6 @@ fn base(
     }
 }
 
-/// The ends of the pile, and of the elements of its shaft between them, from the head down.
-fn stations([top, bottom]: [f64; 2], shaft: &[Facet]) -> Vec<f64> {
-    let close = SAME * (top - bottom);
-    let mut stations = vec![top];
-    let mut between: Vec<f64> = shaft.iter().flat_map(|facet| facet.z).collect();
-    between.sort_unstable_by(|a, b| b.total_cmp(a));
-    for z in between {
-        let last = stations.last().copied().unwrap_or(top);
-        if z < last - close && z > bottom + close {
-            stations.push(z);
-        }
-    }
-    stations.push(bottom);
-    stations
-}
-
-/// By station, the nodes whose settlement it has.
-fn settle(
-    mesh: &Mesh,
-    stations: &[f64],
-    shaft: &[Facet],
-    [head, base]: [&Vec<usize>; 2],
-) -> Vec<Vec<usize>> {
-    let last = stations.len() - 1;
-    let close = SAME * (stations[0] - stations[last]);
-    let of_station = |(number, &z): (usize, &f64)| {
-        if number == 0 {
-            return head.clone();
-        }
-        if number == last {
-            return base.clone();
-        }
-        let ends = shaft.iter().flat_map(|facet| &facet.nodes[..2]).copied();
-        let mut nodes: Vec<usize> = ends
-            .filter(|&node| (mesh.nodes[node][1] - z).abs() <= close)
-            .collect();
-        nodes.sort_unstable();
-        nodes.dedup();
-        nodes
-    };
-    stations.iter().enumerate().map(of_station).collect()
-}
-
 /// The elements of groups, by group, and the sides of the head: area, group and element.
 fn bodies(
     analysis: Analysis,
@@ -458,6 +417,7 @@ fn facets(
                 colours.entry(node).or_default().push(colour);
             }
             facets.push(Facet {
+                number: facets.len(),
                 group: number,
                 element,
                 nodes: side,

@@ -1,5 +1,6 @@
 //! Warnings about an implausible pile.
 
+use super::compliance::is_transfer;
 use super::geometry::{SAME, sides};
 use super::{Base, Pile};
 use mechanics::problem::{Analysis, Axis, Formulation, Phase};
@@ -56,10 +57,11 @@ impl Pile {
         let operator = |number: usize| groups[number].elastic_operator(0);
         let diameter = self.diameter();
         let mut said = Vec::new();
-        for joint in self
-            .joints()
-            .filter(|&joint| groups[joint].formulation == Formulation::ZeroThickness)
-        {
+        let is_joint = |joint: &usize| {
+            let group = &groups[*joint];
+            group.formulation == Formulation::ZeroThickness && !is_transfer(group)
+        };
+        for joint in self.joints().filter(is_joint) {
             let nodes_of = |number: usize| {
                 let kinematics = &groups[number].kinematics;
                 (0..kinematics.n_elements()).flat_map(|element| kinematics.nodes(element))

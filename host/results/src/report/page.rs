@@ -10,7 +10,7 @@ use super::pile::Pile;
 use super::profile::Profile;
 use super::results::{Ending, History, Run};
 use crate::mesh_error::OfPhase;
-use crate::summary::{Figure, Group, Head, Law, Phase, Resistances, Summary};
+use crate::summary::{Figure, Group, Head, Law, Phase, Resistances, Section, Summary};
 use minijinja::value::Serde;
 use minijinja::{Environment, Value as Template, context};
 use serde::{Deserialize, Serialize};
@@ -46,10 +46,14 @@ const NAMED: usize = 4;
 /// Larger pictures are not copied into the page, in bytes.
 const LARGEST_PICTURE: usize = 200_000;
 /// Files of a run that the page links to.
-const FILES: [(&str, &str); 7] = [
+const FILES: [(&str, &str); 8] = [
     ("history.csv", "every increment, every probe"),
     ("profile.csv", "values along interfaces"),
     ("pile.csv", "forces, friction and settlement along the pile"),
+    (
+        "cycles.csv",
+        "largest and smallest loads of the pile's cycles",
+    ),
     ("points.csv", "values at integration points"),
     ("fields.pvd", "fields, for programs that read VTK files"),
     ("log.jsonl", "every iteration and cut-back"),
@@ -66,6 +70,7 @@ struct Drawn<'a> {
     profile: Option<&'a Profile>,
     pile: Option<&'a Pile>,
     resistances: Option<&'a Resistances>,
+    section: Option<&'a Section>,
     fields: Option<&'a Fields>,
     log: &'a Log,
     model: Option<&'a Model>,
@@ -73,13 +78,23 @@ struct Drawn<'a> {
     units: BTreeMap<&'a str, &'a str>,
 }
 
-/// The text of the page, for a file in `folder`; of a run that is under way with the present time, in
-/// seconds since 1970.
-pub(super) fn render(runs: &[Run], folder: &Path, now: Option<u64>) -> Result<String, Error> {
+/// What the page is for.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum For {
+    /// A screen.
+    Screen,
+    /// Paper: no controls, a block with the title, everything open.
+    Paper,
+    /// A run that is under way, at this time in seconds since 1970.
+    Running(u64),
+}
+
+/// The text of the page, for a file in `folder`.
+pub(super) fn render(runs: &[Run], folder: &Path, kind: For) -> Result<String, Error> {
     let internal = |why: String| Error::Internal(format!("report: {why}"));
     let drawn: Vec<Drawn<'_>> = runs.iter().zip(figures(runs)).map(drawn).collect();
     let data = serde_json::to_string(&drawn).map_err(|error| internal(error.to_string()))?;
-    let page = page(runs, folder, now, &data).map_err(|error| internal(error.to_string()))?;
+    let page = page(runs, folder, kind, &data).map_err(|error| internal(error.to_string()))?;
     let mut environment = Environment::new();
     environment
         .add_template("report.html", TEMPLATE)
@@ -88,7 +103,11 @@ pub(super) fn render(runs: &[Run], folder: &Path, now: Option<u64>) -> Result<St
         .map_err(|error| internal(format!("{error:#}")))
 }
 
-fn page(runs: &[Run], folder: &Path, now: Option<u64>, data: &str) -> serde_json::Result<Template> {
+fn page(runs: &[Run], folder: &Path, kind: For, data: &str) -> serde_json::Result<Template> {
+    let now = match kind {
+        For::Running(now) => Some(now),
+        For::Screen | For::Paper => None,
+    };
     let is_comparison = runs.len() > 1;
     let is_many = runs.len() > MANY;
     let title = if is_many {
@@ -110,6 +129,7 @@ fn page(runs: &[Run], folder: &Path, now: Option<u64>, data: &str) -> serde_json
     Ok(context! {
         title,
         running => now.map(running),
+        paper => matches!(kind, For::Paper),
         is_comparison,
         is_many,
         varied => safe(&varied),
@@ -197,6 +217,7 @@ fn drawn((run, figures): (&Run, Vec<Figure>)) -> Drawn<'_> {
         profile: run.profile.as_ref(),
         pile: run.pile.as_ref(),
         resistances: run.summary.pile.as_ref(),
+        section: run.summary.head.pile_section.as_ref(),
         fields: run.fields.as_ref(),
         log: &run.log,
         model: run.model.as_ref(),
@@ -356,28 +377,67 @@ fn ends(run: &Run) -> Template {
 }
 
 /// Criteria of a pile's resistance: name, load or why none exists.
-fn resistances(pile: &Resistances) -> Vec<(&'static str, String)> {
+fn resistances(pile: &Resistances) -> Vec<(String, String)> {
+    let of = pile
+        .diameter
+        .map_or_else(String::new, |diameter| format!(", D = {diameter:.4} m"));
+    let split = |load: Option<f64>, [shaft, base]: [Option<f64>; 2], phase: &Option<String>| {
+        let load = load.map(|load| format!("{load:.1} {}", pile.unit))?;
+        let split = shaft.zip(base).map_or_else(String::new, |(shaft, base)| {
+            format!(", of it shaft {shaft:.1} and base {base:.1}")
+        });
+        let phase = phase.as_ref();
+        let phase = phase.map_or_else(String::new, |phase| format!(" (phase {phase})"));
+        Some(format!("{load}{split}{phase}"))
+    };
     let criteria = [
         (
-            "at a settlement of 10 % of the diameter",
-            pile.resistance_10_percent_diameter,
+            format!("at a settlement of D/10{of}"),
+            split(
+                pile.resistance_10_percent_diameter,
+                [
+                    pile.resistance_10_percent_diameter_shaft,
+                    pile.resistance_10_percent_diameter_base,
+                ],
+                &pile.resistance_10_percent_diameter_phase,
+            ),
             &pile.resistance_10_percent_diameter_reason,
         ),
-        ("of it shaft", pile.shaft_at_10_percent_diameter, &None),
-        ("of it base", pile.base_at_10_percent_diameter, &None),
         (
-            "by Davisson",
-            pile.resistance_davisson,
+            format!("by Davisson{of}"),
+            split(
+                pile.resistance_davisson,
+                [
+                    pile.resistance_davisson_shaft,
+                    pile.resistance_davisson_base,
+                ],
+                &pile.resistance_davisson_phase,
+            ),
             &pile.resistance_davisson_reason,
         ),
         (
-            "by Chin",
-            pile.resistance_chin,
+            "by Chin".to_owned(),
+            split(pile.resistance_chin, [None; 2], &None).map(|load| {
+                format!("{load}, extrapolated: an asymptote that no load reached, no design value")
+            }),
             &pile.resistance_chin_reason,
         ),
+        (
+            format!("uplift at a heave of D/10{of}"),
+            split(
+                pile.uplift_10_percent_diameter,
+                [None; 2],
+                &pile.uplift_10_percent_diameter_phase,
+            ),
+            &None,
+        ),
+        (
+            format!("uplift by Davisson{of}"),
+            split(pile.uplift_davisson, [None; 2], &pile.uplift_davisson_phase),
+            &None,
+        ),
     ];
-    let said = |(name, load, why): (_, Option<f64>, &Option<String>)| {
-        let load = load.map(|load| format!("{load:.1} {}", pile.unit));
+    let said = |(name, load, why): (String, Option<String>, &Option<String>)| {
         Some((name, load.or_else(|| why.clone())?))
     };
     criteria.into_iter().filter_map(said).collect()

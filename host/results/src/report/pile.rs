@@ -10,7 +10,7 @@ use std::path::Path;
 use text::Error;
 
 /// Columns that the table has to have: place, station, quantities.
-const COLUMNS: [&str; 8] = [
+const COLUMNS: [&str; 10] = [
     "phase",
     "increment",
     "z",
@@ -19,6 +19,8 @@ const COLUMNS: [&str; 8] = [
     "normal_stress",
     "slip",
     "settlement",
+    "axial_force_net",
+    "shaft_friction_net",
 ];
 
 /// The pile of a run.

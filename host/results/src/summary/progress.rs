@@ -293,6 +293,7 @@ fn head(about: &About, wanted: &OutputRequest, simulation: &Simulation) -> Head 
         accuracy: about.chosen.clone(),
         figures: of_probes.map(figure).collect(),
         pictures: pictures.collect(),
+        pile_section: wanted.pile.as_ref().map(|pile| pile.section(simulation)),
         probe_units: probe_units(about, wanted, problem.analysis.force_unit()),
         laws: laws.collect(),
         mesh: Mesh {
@@ -311,8 +312,11 @@ fn probe_units(about: &About, wanted: &OutputRequest, force_unit: &str) -> Named
     let mut units: Named<Option<String>> = about.probe_units.iter().cloned().collect();
     if wanted.pile.is_some() {
         for column in crate::pile::COLUMNS {
-            let is_length = column == "pile_settlement";
-            let unit = if is_length { "m" } else { force_unit };
+            let unit = if crate::pile::is_length(column) {
+                "m"
+            } else {
+                force_unit
+            };
             units.insert(column.to_owned(), Some(unit.to_owned()));
         }
     }
@@ -376,6 +380,7 @@ fn figure(figure: &output_request::Figure) -> Figure {
         x_label: figure.x_label.clone(),
         y: figure.y.clone(),
         y_label: figure.y_label.clone(),
+        y_reversed: figure.y_reversed,
     }
 }
 

@@ -117,6 +117,7 @@ fn fit(
             label: "measured".to_owned(),
             points: fitted.curve.points.clone(),
             of_curve: Some(number),
+            ..Measured::default()
         });
     let figure = Figure {
         name: name.to_owned(),

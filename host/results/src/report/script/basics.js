@@ -101,7 +101,9 @@ const DARK = ['#56b4e9', '#ff8f4a', '#2fcf9f', '#e79cc8', '#d5dade', '#e6c229', 
 const DASHES = [[], [7, 4], [2, 3], [9, 3, 2, 3], [12, 5]];
 
 const darkScheme = window.matchMedia('(prefers-color-scheme: dark)');
-let printing = false;
+/** The page is for paper, whatever opens it. */
+const onPaper = document.documentElement.classList.contains('paper');
+let printing = onPaper;
 
 function isDark() {
   return darkScheme.matches && !printing;
@@ -193,7 +195,7 @@ function setPrinting(on) {
   redrawAll();
 }
 window.addEventListener('beforeprint', () => setPrinting(true));
-window.addEventListener('afterprint', () => setPrinting(false));
+window.addEventListener('afterprint', () => setPrinting(onPaper));
 
 // --- saving pictures ---------------------------------------------------------------------------
 

@@ -194,6 +194,8 @@ function makeChart(host, height, name) {
     get canvas() {
       return u.ctx.canvas;
     },
+    /** Where the plot lies in the picture, in pixels, and what its vertical axis shows. */
+    frame: () => ({ top: u.bbox.top / uPlot.pxRatio, height: u.bbox.height / uPlot.pxRatio, range: rangeAlong('y') }),
     /** What is shown where the last point of the first curve is pointed at. */
     hoverLast() {
       const { x, y } = spec.series[0];

@@ -47,11 +47,13 @@ function curves(x, ys, phase) {
 /** What makes figures of several cases the same. */
 const figureKey = figure => JSON.stringify([figure.name, figure.x, figure.y, figure.phase]);
 
-/** Points that were measured for a figure of any run, as markers; `n` colours are taken. */
+/** Points that were measured for a figure of any run, as markers; `n` colours are taken. Those of one curve have its colour. */
 function measured(figure, n) {
   const same = [].concat(...runs.map(run => (run.figures || []).filter(other => figureKey(other) === figureKey(figure))));
   const all = [].concat(...same.map(other => other.measured || []));
-  return all.map(({ label, x, y }, k) => ({ name: label, x, y, colour: n + k, line: false, points: true, radius: 3, tip: () => 'measured' }));
+  const curves = figure.y.length;
+  const colourOf = k => (isComparison ? n + k : curves === 1 ? 0 : all.length === curves ? k : n + k);
+  return all.map(({ label, x, y }, k) => ({ name: label, x, y, colour: colourOf(k), line: false, points: true, radius: 3, tip: () => 'measured' }));
 }
 
 /** Figures of all cases; those of the same name and probes once. */
@@ -80,7 +82,7 @@ part(() => {
       make('div', { class: 'card-head' }, make('h3', {}, title), chart.save(() => title + colourWords())), body));
     const fill = () => chart.set({
       x: { label: figure.x_label || withUnit(figure.x, unitOf(figure.x)) },
-      y: { label: figure.y_label || withUnit(figure.y.join(', '), commonUnit(figure.y)) },
+      y: { label: figure.y_label || withUnit(figure.y.join(', '), commonUnit(figure.y)), down: figure.y_reversed },
       series: [...curves(figure.x, figure.y, figure.phase), ...measured(figure, isComparison ? runs.length : figure.y.length)],
       keepLegend: !isMany,
     });
