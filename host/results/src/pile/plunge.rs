@@ -43,7 +43,7 @@ impl Pile {
         Some(format!(
             "pile: {way} of {carried_net:.1} {unit} (net), where phase `{}` asks for {end_net:.1}{}; {advice}",
             phase.name,
-            self.mechanism(simulation, none)
+            self.mechanism(simulation, none, sign < 0.0)
         ))
     }
 
@@ -77,7 +77,7 @@ impl Pile {
     }
 
     /// What of the pile gives way in the last attempt at a step, in words after a colon.
-    fn mechanism(&self, simulation: &Simulation, none: &NoEquilibrium) -> String {
+    fn mechanism(&self, simulation: &Simulation, none: &NoEquilibrium, is_pushed: bool) -> String {
         let (groups, time) = (simulation.groups(), simulation.time());
         let worst = none.failure.mechanism.as_ref();
         let is_at =
@@ -91,25 +91,36 @@ impl Pile {
         let points = shaft
             .iter()
             .map(|&number| groups[number].kinematics.n_points());
-        let most_slide = 2 * modes.len() > points.sum::<usize>();
-        let opens = modes.iter().filter(|mode| **mode != FailureMode::Slides);
+        let most_give = 2 * modes.len() > points.sum::<usize>();
+        let worst_of_shaft = worst.filter(|_| shaft.iter().any(|&number| is_at(number)));
+        let slide = modes
+            .iter()
+            .filter(|mode| **mode == FailureMode::Slides)
+            .count();
         let mut said = Vec::new();
-        if most_slide || shaft.iter().any(|&number| is_at(number)) {
-            let opens = 2 * opens.count() > modes.len();
-            said.push(if opens {
-                "the shaft opens"
-            } else {
-                "the shaft slides"
-            });
+        match worst_of_shaft.map(|worst| worst.how) {
+            Some(FailureMode::Opens | FailureMode::BondBreaks) => said.push("the shaft opens"),
+            Some(_) => said.push("the shaft slides"),
+            None if most_give && 2 * slide < modes.len() => said.push("the shaft opens"),
+            None if most_give => said.push("the shaft slides"),
+            None => {}
         }
+        let bears =
+            |mode: FailureMode| !matches!(mode, FailureMode::Opens | FailureMode::BondBreaks);
         let is_below = match &self.parts.base {
-            Base::Group(group) => is_at(*group) || gives(*group).next().is_some(),
+            Base::Group(group) if is_at(*group) => worst.is_some_and(|worst| bears(worst.how)),
+            Base::Group(group) => gives(*group).any(|mode| mode == FailureMode::Crushes),
             Base::Line(_) => false,
         };
         let in_ground =
             |worst: &Mechanism| matches!(worst.how, FailureMode::Yields | FailureMode::ComesApart);
         if is_below || worst.is_some_and(in_ground) {
-            said.push("the base yields");
+            let part = if is_pushed {
+                "the base yields"
+            } else {
+                "the ground yields"
+            };
+            said.push(part);
         }
         if said.is_empty() {
             return worst.map_or_else(String::new, |worst| format!(": {}", worst.how));
