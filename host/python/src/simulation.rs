@@ -95,7 +95,7 @@ impl Watch for Follower<'_> {
         self.caller.tell(warning.to_string());
     }
 
-    fn quantity(&mut self, name: &str, state: &Snapshot<'_>) -> Option<f64> {
+    fn quantity(&mut self, _phase: &str, name: &str, state: &Snapshot<'_>) -> Option<f64> {
         self.wanted?.quantity(name, state)
     }
 

@@ -35,11 +35,7 @@ impl OutputRequest {
         let number = self.columns().position(|other| other == name)?;
         let mut values = self.probes.values(snapshot);
         let of_pile = self.pile.as_ref().and_then(|pile| pile.state(snapshot));
-        values.extend(
-            of_pile
-                .iter()
-                .flat_map(|state| state.loads.values().map(Some)),
-        );
+        values.extend(of_pile.iter().flat_map(pile::State::values));
         values.get(number).copied().flatten()
     }
 }

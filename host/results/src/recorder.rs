@@ -330,7 +330,7 @@ impl Recorder {
         iterations: usize,
         snapshot: &Snapshot<'_>,
     ) -> Result<(), Fault> {
-        self.begins(place, snapshot);
+        self.begins(&place.phase, snapshot);
         let (probes, _) = self.values(place, snapshot)?;
         let Some(path) = &mut self.path else {
             return Ok(());
@@ -339,10 +339,10 @@ impl Recorder {
         Ok(path.flush()?)
     }
 
-    /// A state of this place's phase is about to be looked at.
-    fn begins(&mut self, place: &Place, snapshot: &Snapshot<'_>) {
+    /// A state of this phase is about to be looked at.
+    fn begins(&mut self, phase: &str, snapshot: &Snapshot<'_>) {
         if let Some(pile) = &mut self.pile {
-            pile.begins(place, snapshot);
+            pile.begins(phase, snapshot);
         }
     }
 
@@ -399,7 +399,7 @@ impl Recorder {
         time: f64,
         snapshot: &Snapshot<'_>,
     ) -> Result<(), Error> {
-        self.begins(place, snapshot);
+        self.begins(&place.phase, snapshot);
         self.summary.course.stopped = Some(Stopped {
             phase: place.phase.clone(),
             load_factor,
@@ -426,7 +426,7 @@ impl Recorder {
         let Increment {
             place, of, time, ..
         } = increment;
-        self.begins(place, snapshot);
+        self.begins(&place.phase, snapshot);
         let (probes, pile) = self.values(place, snapshot)?;
         let start = Instant::now();
         self.history

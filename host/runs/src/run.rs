@@ -483,8 +483,8 @@ impl Watch for Follower<'_> {
         self.observer.at_rest(phase, share);
     }
 
-    fn quantity(&mut self, name: &str, state: &Snapshot<'_>) -> Option<f64> {
-        self.results.quantity(name, state)
+    fn quantity(&mut self, phase: &str, name: &str, state: &Snapshot<'_>) -> Option<f64> {
+        self.results.quantity(phase, name, state)
     }
 
     fn reached(&mut self, end: &Reached) {

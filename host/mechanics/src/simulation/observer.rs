@@ -111,8 +111,8 @@ pub trait Watch {
     /// equilibrium.
     fn at_rest(&mut self, _phase: &str, _share: f64) {}
 
-    /// The value of a quantity that may end a phase; `None` where it is not there, or not known.
-    fn quantity(&mut self, _name: &str, _state: &Snapshot<'_>) -> Option<f64> {
+    /// The value of a quantity that may end this phase; `None` where it is not there, or not known.
+    fn quantity(&mut self, _phase: &str, _name: &str, _state: &Snapshot<'_>) -> Option<f64> {
         None
     }
 

@@ -86,7 +86,8 @@ impl Simulation {
             return;
         };
         if let Some(until) = self.problem.phases[phase.number].until.clone() {
-            let value = watch.quantity(&until.quantity, &self.snapshot());
+            let name = &self.problem.phases[phase.number].name;
+            let value = watch.quantity(name, &until.quantity, &self.snapshot());
             phase.course.measured = value.map(|value| [value; 2]);
             let near = |value: f64| (value - until.reaches).abs() <= ROUND_OFF * value.abs();
             if let Some(value) = value.filter(|value| near(*value)) {
@@ -113,7 +114,7 @@ impl Simulation {
         let looked_at = watch.looks_at(When::Step, &self.groups);
         self.complete(phase, looked_at.as_ref())
             .map_err(|reason| self.incomplete(phase, place, lambda, reason))?;
-        let value = watch.quantity(&until.quantity, &self.snapshot());
+        let value = watch.quantity(&place.phase, &until.quantity, &self.snapshot());
         let Some(value) = value.filter(|value| value.is_finite()) else {
             return Ok(Verdict::GoesOn);
         };

@@ -180,19 +180,9 @@ impl fmt::Display for Warning {
             ),
             Self::NotReached {
                 phase,
-                until: Until { quantity, reaches },
+                until,
                 value,
-            } => {
-                write!(
-                    f,
-                    "phase `{phase}`: `{quantity}` has not reached {reaches}, and the phase has come to its end"
-                )?;
-                if value.is_nan() {
-                    Ok(())
-                } else {
-                    write!(f, ": it is {value:.6}")
-                }
-            }
+            } => not_reached(f, phase, until, *value),
             Self::RoundOff {
                 phase,
                 tolerance,
@@ -271,6 +261,23 @@ impl fmt::Display for Warning {
                  path between {lowest:.4} and {highest:.4} (path.csv)"
             ),
         }
+    }
+}
+
+fn not_reached(
+    f: &mut fmt::Formatter<'_>,
+    phase: &str,
+    Until { quantity, reaches }: &Until,
+    value: f64,
+) -> fmt::Result {
+    write!(
+        f,
+        "phase `{phase}`: `{quantity}` has not reached {reaches}, and the phase has come to its end"
+    )?;
+    if value.is_nan() {
+        Ok(())
+    } else {
+        write!(f, ": it is {value:.6}")
     }
 }
 

@@ -101,7 +101,7 @@ fn dragload(spans: &[Span], rows: &[Row], friction: &[f64], last: usize) -> f64 
         let is_element = rows[row + 1].at.iter().any(|(_, part)| *part == 1);
         if let Some(&[a, m, b]) = of_three
             && is_element
-            && row + 1 <= last
+            && row < last
             && a.max(m).max(b) <= 0.0
         {
             sum += 2.0 * area * (a + 4.0 * m + b) / 6.0;

@@ -70,10 +70,9 @@ impl Record {
         })
     }
 
-    /// A state of this place's phase is about to be looked at.
-    pub(crate) fn begins(&mut self, place: &Place, snapshot: &Snapshot<'_>) {
-        self.net
-            .begins(&place.phase, snapshot.problem, self.pile.shaft());
+    /// A state of this phase is about to be looked at.
+    pub(crate) fn begins(&mut self, phase: &str, snapshot: &Snapshot<'_>) {
+        self.net.begins(phase, snapshot.problem, self.pile.shaft());
     }
 
     /// The pile with its net forces; `None` if it is absent.
