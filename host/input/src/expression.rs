@@ -42,8 +42,11 @@ pub(crate) enum Expression {
     Extreme(fn(f64, f64) -> f64, Vec<Expression>),
 }
 
+/// Functions with their names.
+type Named<F, const N: usize> = [(&'static str, F); N];
+
 /// Functions of one number.
-const FUNCTIONS: [(&str, fn(f64) -> f64); 9] = [
+const FUNCTIONS: Named<fn(f64) -> f64, 9> = [
     ("sin", |x| x.to_radians().sin()),
     ("cos", |x| x.to_radians().cos()),
     ("tan", |x| x.to_radians().tan()),
@@ -56,10 +59,10 @@ const FUNCTIONS: [(&str, fn(f64) -> f64); 9] = [
 ];
 
 /// Those of several.
-const EXTREMES: [(&str, fn(f64, f64) -> f64); 2] = [("min", f64::min), ("max", f64::max)];
+const EXTREMES: Named<fn(f64, f64) -> f64, 2> = [("min", f64::min), ("max", f64::max)];
 
 /// Functions of a law.
-const MODULI: [(&str, fn(String) -> Reference); 2] = [
+const MODULI: Named<fn(String) -> Reference, 2> = [
     ("shear_modulus", Reference::ShearModulus),
     ("oedometric_modulus", Reference::OedometricModulus),
 ];

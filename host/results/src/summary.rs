@@ -206,6 +206,7 @@ pub(crate) struct Law {
 /// A parameter that follows from others, with its smallest and largest value.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
+#[expect(clippy::struct_field_names, reason = "names of the file")]
 pub(crate) struct Expression {
     pub(crate) expression: String,
     pub(crate) smallest: f64,

@@ -19,6 +19,9 @@ use std::sync::Arc;
 use text::{Source, suggestion};
 use toml::Spanned;
 
+/// Key of a law, and the bits of its parameters at a place.
+type LawAt = (String, Vec<u64>);
+
 /// Laws built so far; each once for every hypothesis.
 pub(super) struct LawShelf<'a> {
     pub(super) source: &'a Source,
@@ -30,7 +33,7 @@ pub(super) struct LawShelf<'a> {
     pub(super) water: Option<&'a Water>,
     pub(super) ground: Vec<Ground>,
     pub(super) opened: RefCell<HashMap<String, LoadedLaw>>,
-    pub(super) grounds: RefCell<HashMap<(String, Vec<u64>), Arc<BuiltLaw>>>,
+    pub(super) grounds: RefCell<HashMap<LawAt, Arc<BuiltLaw>>>,
 }
 
 impl<'a> LawShelf<'a> {

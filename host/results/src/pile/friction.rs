@@ -309,6 +309,12 @@ mod tests {
             assert!((mean - span.mean[0]).abs() < 1e-13, "{found:?}");
             assert!(found.iter().all(|&value| value <= limit), "{found:?}");
         }
-        assert_eq!(friction(&spans)[1], [limit; 3]);
+        let in_limit = friction(&spans)[1];
+        assert!(
+            in_limit
+                .iter()
+                .all(|value| value.to_bits() == limit.to_bits()),
+            "{in_limit:?}"
+        );
     }
 }
