@@ -128,12 +128,13 @@ impl Pile {
                 (active || phase.activate.contains(&group)) && !phase.deactivate.contains(&group)
             })
         };
+        let swap = |group: usize| {
+            let mut swaps = phases.iter().flat_map(|phase| &phase.materials).rev();
+            swaps.find_map(|(of, law)| (*of == group).then_some(law))
+        };
         let law = |group: usize| {
-            let swaps = phases.iter().flat_map(|phase| &phase.materials);
-            let last = swaps.rev().find(|(of, _)| *of == group);
-            &last
-                .map_or(&problem.groups[group].material, |(_, law)| law)
-                .name
+            let own = &problem.groups[group].material;
+            &swap(group).unwrap_or(own).name
         };
         if let Some(absent) = self.joints().find(|&group| !is_active(group)) {
             return Some(format!(
@@ -142,9 +143,11 @@ impl Pile {
             ));
         }
         let own = self.parts.groups.iter().filter(|&&group| is_active(group));
+        // A cap or raft beside the pile was ground too, until its law was swapped.
         let ground = problem.groups.iter().enumerate().filter(|(number, group)| {
             group.initial_stress.is_some()
                 && is_active(*number)
+                && swap(*number).is_none()
                 && !self.parts.groups.contains(number)
         });
         let ground: Vec<(usize, &String)> = ground.map(|(n, group)| (n, &group.name)).collect();
