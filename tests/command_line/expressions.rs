@@ -55,7 +55,10 @@ fn what_follows_from_the_ground_follows_its_changes() {
     );
     for (set, young) in [
         (&[][..], 1e4),
-        (&["--set", "laws.soil.parameters.young_modulus=2e4"], 2e4),
+        (
+            &["--set", "laws.soil.parameters.young_modulus=2e4"][..],
+            2e4,
+        ),
     ] {
         let (summary, _) = run(&text, set);
         let joint = &summary["laws"]["joint (interface_2d)"];

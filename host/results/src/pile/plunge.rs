@@ -37,8 +37,7 @@ impl Pile {
         {
             format!("forces are in {unit}: was it typed in N?")
         } else {
-            "prescribe a `displacement` of the head instead of a `force`, or end the phase with `until`"
-                .to_owned()
+            "prescribe a `displacement` of the head, or end the phase with `until`".to_owned()
         };
         Some(format!(
             "pile: {way} of {carried_net:.1} {unit} (net), where phase `{}` asks for {end_net:.1}{}; {advice}",
@@ -97,13 +96,17 @@ impl Pile {
             .iter()
             .filter(|mode| **mode == FailureMode::Slides)
             .count();
+        let opens = match worst_of_shaft.map(|worst| worst.how) {
+            Some(how) if !most_give => matches!(how, FailureMode::Opens | FailureMode::BondBreaks),
+            _ => 2 * slide < modes.len(),
+        };
         let mut said = Vec::new();
-        match worst_of_shaft.map(|worst| worst.how) {
-            Some(FailureMode::Opens | FailureMode::BondBreaks) => said.push("the shaft opens"),
-            Some(_) => said.push("the shaft slides"),
-            None if most_give && 2 * slide < modes.len() => said.push("the shaft opens"),
-            None if most_give => said.push("the shaft slides"),
-            None => {}
+        if most_give || worst_of_shaft.is_some() {
+            said.push(if opens {
+                "the shaft opens"
+            } else {
+                "the shaft slides"
+            });
         }
         let bears =
             |mode: FailureMode| !matches!(mode, FailureMode::Opens | FailureMode::BondBreaks);
