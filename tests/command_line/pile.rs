@@ -593,7 +593,10 @@ fn a_figure_along_the_pile_is_drawn_or_told_what_is_wrong() {
     };
     let (place, _) = run(&(PILE.to_owned() + &figure("along_pile = {}", "axial_force")));
     let drawn = std::fs::read_to_string(place.path("out/forces.svg")).unwrap();
-    assert!(drawn.contains("pull, -"), "a curve for the end of a phase, by its load");
+    assert!(
+        drawn.contains("pull, -"),
+        "a curve for the end of a phase, by its load"
+    );
     let without = PILE[..PILE.rfind("[pile]").unwrap()].to_owned();
     for (text, along, x, says) in [
         (

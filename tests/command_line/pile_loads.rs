@@ -71,7 +71,11 @@ fn close(found: f64, expected: f64, scale: f64, what: &str) {
 }
 
 fn of<'r>(table: &'r [Row], place: &Row) -> Vec<&'r Row> {
-    let same = |row: &&Row| ["phase", "increment"].iter().all(|key| row[*key] == place[*key]);
+    let same = |row: &&Row| {
+        ["phase", "increment"]
+            .iter()
+            .all(|key| row[*key] == place[*key])
+    };
     table.iter().filter(same).collect()
 }
 
@@ -100,7 +104,10 @@ fn net_loads_are_changes_and_simpson_gives_the_shaft_load() {
         "[groups]",
         "deep = { law = \"coulomb_joint\", parameters = { normal_stiffness = 1e6, shear_stiffness = 2e5, cohesion = 20.0, friction_angle = 10.0, dilatancy_angle = 0.0 } }\n[groups]",
     );
-    let two = laws.replace("line = \"lower\", law = \"skin\"", "line = \"lower\", law = \"deep\"");
+    let two = laws.replace(
+        "line = \"lower\", law = \"skin\"",
+        "line = \"lower\", law = \"deep\"",
+    );
     for (text, n) in [(PILE, 11), (&two, 12)] {
         let (place, _) = run(text);
         let history = rows(&place.path("out/history.csv"));
@@ -110,7 +117,9 @@ fn net_loads_are_changes_and_simpson_gives_the_shaft_load() {
         let mut last: Option<Row> = None;
         for row in history {
             let phase = row["phase"].as_str();
-            let is_first = last.as_ref().is_none_or(|last| last["phase"] != row["phase"]);
+            let is_first = last
+                .as_ref()
+                .is_none_or(|last| last["phase"] != row["phase"]);
             if is_first && matches!(phase, "built" | "push") {
                 from.clone_from(&last);
             }
@@ -145,24 +154,37 @@ fn net_loads_are_changes_and_simpson_gives_the_shaft_load() {
         }
         // Where two laws meet, one row on either side.
         let at = of(&along, last.as_ref().unwrap());
-        let there = at.iter().filter(|row| (value(row, "z") + 3.0).abs() < 1e-12);
+        let there = at
+            .iter()
+            .filter(|row| (value(row, "z") + 3.0).abs() < 1e-12);
         assert_eq!(there.count(), n - 10);
     }
 }
 
 #[test]
 fn a_rigid_pile_hands_its_load_down_in_proportion() {
-    let phases = "[[phase]]\nname = \"push\"\nincrements = 4\nforce = [{ line = \"head\", z = -200.0 }]";
+    let phases =
+        "[[phase]]\nname = \"push\"\nincrements = 4\nforce = [{ line = \"head\", z = -200.0 }]";
     let (place, _) = run(&ring(1e4, phases));
     let history = rows(&place.path("out/history.csv"));
     let along = rows(&place.path("out/pile.csv"));
     for row in &history {
         let load = value(row, "pile_head_load_net");
         close(load, value(row, "pile_head_load"), 1e-12, "from zero");
-        close(value(row, "pile_settlement"), load / STIFFNESS_OF_SHAFT, 1e-6, "settlement");
+        close(
+            value(row, "pile_settlement"),
+            load / STIFFNESS_OF_SHAFT,
+            1e-6,
+            "settlement",
+        );
         assert_eq!(row["pile_neutral_plane"], "", "{row:?}");
         assert!(value(row, "pile_dragload").abs() < 1e-9, "{row:?}");
-        close(value(row, "pile_max_axial_force"), load, 1e-9, "largest force");
+        close(
+            value(row, "pile_max_axial_force"),
+            load,
+            1e-9,
+            "largest force",
+        );
         let own = of(&along, row);
         assert_eq!(own.len(), 17);
         for station in own {
@@ -188,10 +210,20 @@ fn ground_that_sinks_drags_a_pile_down_above_its_neutral_plane() {
         let s = u / 2.0 + load / STIFFNESS_OF_SHAFT;
         close(value(row, "pile_settlement"), s, 1e-6, "settlement");
         let plane = s * LENGTH / u;
-        close(value(row, "pile_neutral_plane"), plane, 1e-5, "neutral plane");
+        close(
+            value(row, "pile_neutral_plane"),
+            plane,
+            1e-5,
+            "neutral plane",
+        );
         let drag = 2.0 * PI * RADIUS * STIFFNESS * u * (LENGTH - plane).powi(2) / (2.0 * LENGTH);
         close(value(row, "pile_dragload"), drag, 1e-5, "dragload");
-        close(value(row, "pile_max_axial_force"), load + drag, 1e-5, "largest force");
+        close(
+            value(row, "pile_max_axial_force"),
+            load + drag,
+            1e-5,
+            "largest force",
+        );
     }
 }
 
@@ -213,16 +245,29 @@ fn cycles_are_those_by_hand() {
         assert_eq!(row["phase"], "cycles");
         assert_eq!(row["cycle"], (number + 1).to_string());
         let [s_max, s_min, max, min, permanent] = expected;
-        let names = ["settlement_max", "settlement_min", "load_max", "load_min", "permanent"];
+        let names = [
+            "settlement_max",
+            "settlement_min",
+            "load_max",
+            "load_min",
+            "permanent",
+        ];
         for (name, expected) in names.into_iter().zip(expected) {
             close(value(row, name), expected, 1e-5, name);
         }
         let stiffness = (max - min) / (s_max - s_min);
-        assert!((value(row, "secant_stiffness") / stiffness - 1.0).abs() < 1e-4, "{row:?}");
-        assert!((permanent - value(row, "permanent")).abs() < 1e-8, "{row:?}");
+        assert!(
+            (value(row, "secant_stiffness") / stiffness - 1.0).abs() < 1e-4,
+            "{row:?}"
+        );
+        assert!(
+            (permanent - value(row, "permanent")).abs() < 1e-8,
+            "{row:?}"
+        );
     }
     // A load that only rises has none.
-    let phases = "[[phase]]\nname = \"push\"\nincrements = 4\nforce = [{ line = \"head\", z = -200.0 }]";
+    let phases =
+        "[[phase]]\nname = \"push\"\nincrements = 4\nforce = [{ line = \"head\", z = -200.0 }]";
     let (place, _) = run(&ring(1e4, phases));
     assert!(!place.path("out/cycles.csv").exists());
 }
@@ -235,7 +280,10 @@ fn number(pile: &Value, name: &str) -> f64 {
 fn a_pull_has_the_criteria_of_a_push() {
     // 10 % of 0.5 m, and Davisson's line s = Q/(E A/L) + 3.8 mm + D/120; the joint slides at 2 mm.
     let limit = STIFFNESS_OF_SHAFT * 2e-3;
-    for (z, kind, other) in [(0.06, "uplift", "resistance"), (-0.06, "resistance", "uplift")] {
+    for (z, kind, other) in [
+        (0.06, "uplift", "resistance"),
+        (-0.06, "resistance", "uplift"),
+    ] {
         let phases = format!(
             "[[phase]]\nname = \"test\"\nincrements = 12\nreset_displacements = true\ndisplacement = [{{ line = \"head\", z = {z} }}]"
         );
@@ -270,18 +318,31 @@ fn each_criterion_names_the_last_phase_that_reaches_it() {
     assert_eq!(pile["phase"], "short");
     // The second test begins with the first one's load on the pile: a load cell shows nothing of it.
     let limit = STIFFNESS_OF_SHAFT * 2e-3;
-    close(number(pile, "resistance_10_percent_diameter"), limit, 1e-6, "first");
-    assert!(number(pile, "resistance_davisson").abs() < 1e-4 * limit, "{pile}");
+    close(
+        number(pile, "resistance_10_percent_diameter"),
+        limit,
+        1e-6,
+        "first",
+    );
+    assert!(
+        number(pile, "resistance_davisson").abs() < 1e-4 * limit,
+        "{pile}"
+    );
 }
 
 #[test]
 fn elastic_slip_of_the_joints_is_told_unless_they_are_the_ground() {
-    let phases = "[[phase]]\nname = \"push\"\nincrements = 4\nforce = [{ line = \"head\", z = -200.0 }]";
+    let phases =
+        "[[phase]]\nname = \"push\"\nincrements = 4\nforce = [{ line = \"head\", z = -200.0 }]";
     let text = ring(1e4, phases);
     let says = "elastic slip of the shaft's joints is";
     let place = Place::new();
     let outcome = place.run_case(&text);
-    assert!(outcome.says(says) && outcome.says("`shear_stiffness`"), "{}", outcome.stderr);
+    assert!(
+        outcome.says(says) && outcome.says("`shear_stiffness`"),
+        "{}",
+        outcome.stderr
+    );
     // The same slip along a load transfer curve is that of the ground.
     let curve = text.replace(
         "law = \"coulomb_joint\", parameters = { normal_stiffness = 1e6, shear_stiffness = 20000, cohesion = 10000, friction_angle = 0.0, dilatancy_angle = 0.0 }",

@@ -80,7 +80,11 @@ fn refuse_column(case: &Case, name: &Spanned<String>) -> Result<(), Error> {
     let Some((table, _)) = tables.iter().find(taken) else {
         return Ok(());
     };
-    let mut reserved: Vec<&str> = tables.iter().flat_map(|(_, columns)| *columns).copied().collect();
+    let mut reserved: Vec<&str> = tables
+        .iter()
+        .flat_map(|(_, columns)| *columns)
+        .copied()
+        .collect();
     reserved.sort_unstable();
     reserved.dedup();
     let message = format!(

@@ -149,12 +149,7 @@ impl Figures {
 
     /// Takes what holds along the pile, where that is asked for after this increment, one of `of`. The curve is named by
     /// the head load, net if there is one.
-    pub(crate) fn along_pile(
-        &mut self,
-        place: &Place,
-        of: usize,
-        (state, unit): (&State, &str),
-    ) {
+    pub(crate) fn along_pile(&mut self, place: &Place, of: usize, (state, unit): (&State, &str)) {
         let phase = &place.phase;
         let load = state.net.map_or(state.loads.head, |net| net[0]);
         for (figure, curves) in &mut self.drawn {
@@ -332,11 +327,7 @@ fn draw(
     let entries = names().count();
     let x = range(points().map(|p| p.0), 0.0);
     let y = range(points().map(|p| p.1), 0.05);
-    let y = if labels.y_reversed {
-        y.end..y.start
-    } else {
-        y
-    };
+    let y = if labels.y_reversed { y.end..y.start } else { y };
     let longest = names().map(|name| name.chars().count()).max();
     let legend = [42 + 7 * longest.unwrap_or(0), 16 + 17 * entries];
     let corner = empty_corner(curves, measured, [&x, &y], legend);

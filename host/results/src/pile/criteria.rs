@@ -236,10 +236,14 @@ impl Curve {
     pub(super) fn soft_shaft(&self) -> Option<String> {
         let phase = self.in_place().find(|phase| {
             let away = phase.points.iter().map(|point| point[0] - phase.start[0]);
-            away.fold(0.0, |m: f64, v| m.max(v.abs())) > 0.0 && phase.slips.iter().any(Option::is_some)
+            away.fold(0.0, |m: f64, v| m.max(v.abs())) > 0.0
+                && phase.slips.iter().any(Option::is_some)
         })?;
         let largest = phase.points.iter().fold(0.0, |m: f64, p| m.max(p[1].abs()));
-        let at = phase.points.iter().position(|point| point[1].abs() >= 0.5 * largest)?;
+        let at = phase
+            .points
+            .iter()
+            .position(|point| point[1].abs() >= 0.5 * largest)?;
         let ([settlement, load, ..], slip) = (phase.points[at], phase.slips[at]?);
         let share = slip.abs() / settlement.abs();
         (share > SLIP && settlement != 0.0).then(|| {

@@ -29,7 +29,13 @@ impl Average {
     /// Friction and normal stress at its ends, and in its middle by Simpson's rule.
     fn tractions(&self) -> [[f64; 2]; 3] {
         let [top, bottom] = self.ends;
-        let at = |i: usize| [top[i], (6.0 * self.mean[i] - top[i] - bottom[i]) / 4.0, bottom[i]];
+        let at = |i: usize| {
+            [
+                top[i],
+                (6.0 * self.mean[i] - top[i] - bottom[i]) / 4.0,
+                bottom[i],
+            ]
+        };
         let [friction, normal] = [0, 1].map(at);
         std::array::from_fn(|k| [friction[k], normal[k]])
     }
@@ -225,9 +231,11 @@ fn is_mean(three: [[f64; 2]; 3], point: [f64; 2]) -> bool {
     let size = three.iter().flatten().fold(0.0, |m: f64, v| m.max(v.abs()));
     let slack = 1e-9 * size;
     let is_between = |c: usize| {
-        let [low, high] = three.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], at| {
-            [l.min(at[c]), h.max(at[c])]
-        });
+        let [low, high] = three
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], at| {
+                [l.min(at[c]), h.max(at[c])]
+            });
         low - slack <= point[c] && point[c] <= high + slack
     };
     let is_inside = |k: usize| {

@@ -50,7 +50,10 @@ const FILES: [(&str, &str); 8] = [
     ("history.csv", "every increment, every probe"),
     ("profile.csv", "values along interfaces"),
     ("pile.csv", "forces, friction and settlement along the pile"),
-    ("cycles.csv", "largest and smallest loads of the pile's cycles"),
+    (
+        "cycles.csv",
+        "largest and smallest loads of the pile's cycles",
+    ),
     ("points.csv", "values at integration points"),
     ("fields.pvd", "fields, for programs that read VTK files"),
     ("log.jsonl", "every iteration and cut-back"),
@@ -404,7 +407,10 @@ fn resistances(pile: &Resistances) -> Vec<(String, String)> {
             format!("by Davisson{of}"),
             split(
                 pile.resistance_davisson,
-                [pile.resistance_davisson_shaft, pile.resistance_davisson_base],
+                [
+                    pile.resistance_davisson_shaft,
+                    pile.resistance_davisson_base,
+                ],
                 &pile.resistance_davisson_phase,
             ),
             &pile.resistance_davisson_reason,
