@@ -116,3 +116,42 @@ fn what_cannot_be_drawn_is_refused_at_its_key() {
         assert!(!place.path("out").exists(), "{measured}");
     }
 }
+
+/// Another zero is added after the factor; a reversed axis turns the curve, and a report for paper has no controls.
+#[test]
+fn points_are_moved_and_an_axis_is_reversed() {
+    let place = Place::new();
+    place.write("points.csv", "w,load\n1,10\n2,20\n");
+    let figure = "[[figure]]\nname = \"push\"\nx = \"tau\"\ny = [\"settlement\"]\n";
+    let table = "measured = { file = \"points.csv\", x = \"load\", y = \"w\", x_scale = 0.1, x_offset = -0.5, y_offset = 3.0 }\n";
+    let mut heights = Vec::new();
+    for reversed in [false, true] {
+        let text = format!("{CASE}\n{figure}{table}y_reversed = {reversed}\n");
+        let outcome = place.run_case(text);
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        let summary = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
+        let summary: Value = serde_json::from_str(&summary).unwrap();
+        let points = &summary["figures"][0]["measured"][0];
+        assert_eq!(points["x"], serde_json::json!([0.5, 1.5]));
+        assert_eq!(points["y"], serde_json::json!([4.0, 5.0]));
+        let svg = std::fs::read_to_string(place.path("out/push.svg")).unwrap();
+        let circles = svg.split("<circle").skip(1);
+        let height = |circle: &str| -> f64 {
+            let at = circle.split_once("cy=\"").unwrap().1;
+            at.split_once('"').unwrap().0.parse().unwrap()
+        };
+        let own: Vec<f64> = circles.map(height).collect();
+        heights.push(own[1] - own[0]);
+    }
+    assert!(heights[0] < 0.0 && heights[1] > 0.0, "{heights:?}");
+    let outcome = place.run(&["report", "out", "--print", "--out", "paper.html"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let paper = std::fs::read_to_string(place.path("paper.html")).unwrap();
+    for text in [
+        "class=\"paper print\"",
+        "title-block",
+        "Appendix: all settings",
+    ] {
+        assert!(paper.contains(text), "{text}");
+    }
+}

@@ -260,6 +260,12 @@ part(() => {
     make('div', { class: 'beside' }, ground, make('div', { class: 'panels' }, ...panels.map(panel => panel.node))));
   steer.set(state.step, steps.length - 1);
   draw();
+  if (onPaper) {
+    // States of the test, whose loads are in the legends.
+    const last = steps.findLastIndex(step => step.phase === tested);
+    if (last >= 0) state.step = last;
+    spread();
+  }
   redraws.push(drawGround);
   recolours.push(draw);
   chosen.pile = { loads: loadChart, body: panels[0].node.lastElementChild, along: panels[0].chart, curves: curveChart, steer, title };
