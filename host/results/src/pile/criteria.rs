@@ -1,5 +1,6 @@
 //! The resistance of a pile by its load–settlement curve.
 
+use super::cycles::ROUND_OFF;
 use super::{Loads, Pile, State};
 use crate::summary;
 use serde::{Deserialize, Serialize};
@@ -222,7 +223,9 @@ impl Curve {
         let force = last.points.iter().map(|point| -point[1]);
         let force = force.fold(0.0, f64::max);
         let start = last.start[0];
-        (end < start && force > 0.0).then(|| {
+        let forces = last.points.iter().flat_map(|point| &point[1..]);
+        let most = forces.fold(0.0, |m: f64, force| m.max(force.abs()));
+        (end < start && force > ROUND_OFF * most).then(|| {
             format!(
                 "phase `{}` pulls the head up by {:.4} m, with at most {force:.1} {unit}",
                 last.phase,

@@ -10,6 +10,8 @@ use text::write::replace;
 const LEAST: f64 = 0.01;
 /// Loads closer than this share of the largest are one: where a pile slides, a reversal is at its end.
 const SAME: f64 = 1e-6;
+/// Share of the forces below which a load is nothing.
+pub(super) const ROUND_OFF: f64 = 1e-8;
 /// Name of the file.
 pub(crate) const FILE_NAME: &str = "cycles.csv";
 const COLUMNS: [&str; 8] = [
@@ -78,8 +80,13 @@ pub(crate) fn write(folder: &Path, curve: &Curve) -> Result<(), Error> {
 /// The cycles of a pile that is in place. Those of phases that count settlements anew stand for themselves.
 fn cycles(curve: &Curve) -> Vec<Cycle<'_>> {
     let phases = curve.phases().filter(|phase| phase.is_in_place);
-    let loads = phases.clone().flat_map(|phase| &phase.points);
-    let largest = loads.fold(0.0, |m: f64, point| m.max(point[1].abs()));
+    let points = || phases.clone().flat_map(|phase| &phase.points);
+    let largest = points().fold(0.0, |m: f64, point| m.max(point[1].abs()));
+    // The load of a free head is round-off of the forces below it.
+    let forces = points().flat_map(|point| &point[1..]);
+    if largest <= ROUND_OFF * forces.fold(0.0, |m: f64, force| m.max(force.abs())) {
+        return Vec::new();
+    }
     let least = LEAST * largest;
     let mut courses: Vec<Vec<Head<'_>>> = Vec::new();
     for phase in phases {
