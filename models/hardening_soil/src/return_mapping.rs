@@ -5,6 +5,7 @@
 
 use crate::soil::Soil;
 use crate::system::{Iterate, Rates, System};
+use std::mem;
 
 /// What limits the shear stress.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,7 +116,14 @@ impl Soil {
         let [shear, limit, cap, tension] = self.excess(&trial.s, trial.p_p, trial.gamma);
         let mut zone = Zone {
             merged: Merged::None,
-            shear: if shear > margin || limit > margin { Shear::Hardening } else { Shear::None },
+            // The strength bounds the hardening from outside: its solution is where to begin.
+            shear: if limit > margin {
+                Shear::Limit
+            } else if shear > margin {
+                Shear::Hardening
+            } else {
+                Shear::None
+            },
             cap: cap > margin,
             tension: tension > margin,
             corner: false,
@@ -142,6 +150,7 @@ impl Soil {
         if let Some((guess, iterate)) = guess.and_then(|end| Some((end.zone, end.iterate?))) {
             (zone, multipliers) = (guess, iterate.multipliers);
         }
+        let mut is_guess = zone.merged != base;
         let hardening = self.cap.hardening(self, trial.p_p);
         let mut may_harden = true;
         for _ in 0..MAX_ZONES {
@@ -157,7 +166,11 @@ impl Soil {
                 }
                 return None;
             };
-            multipliers = [0.0; 2];
+            multipliers = end.multipliers.map(|x| x.max(0.0));
+            if mem::take(&mut is_guess) && !system.merges(&end) {
+                zone.merged = base;
+                continue;
+            }
             match self.judge(&system, &end, margin, may_harden) {
                 Verdict::Ends(gamma) => {
                     return Some(End {
@@ -174,6 +187,10 @@ impl Soil {
                 Verdict::Other(other) => {
                     if zone.shear == Shear::Limit && other.shear == Shear::Hardening {
                         may_harden = false;
+                    }
+                    let is_active = [other.shear != Shear::None, other.cap];
+                    for (x, is_active) in multipliers.iter_mut().zip(is_active) {
+                        *x = if is_active { *x } else { 0.0 };
                     }
                     zone = Zone { merged: base, ..other };
                     if zone.shear == Shear::None && !zone.cap {

@@ -40,12 +40,12 @@ abi::parameters! {
         /// What the major preconsolidation stress exceeds this by, where a calculation starts.
         pop: Parameter::new(c"POP", c"kPa").at_least(0.0).default(0.0),
         /// Least number of equal steps that an increment is divided into, whole.
-        substeps: Parameter::new(c"n_s", c"-").at_least(1.0).at_most(1e4).default(1.0),
+        substeps: Parameter::new(c"n_s", c"-").at_least(1.0).at_most(1e3).usual(1.0, 20.0).default(1.0),
         /// Estimated error of a step, relative to the stress, above which it is divided.
         scheme_tolerance: Parameter::new(c"ε_s", c"-")
             .above(0.0)
             .below(1.0)
-            .usual(1e-6, 1e-2)
+            .usual(1e-5, 1e-2)
             .default(1e-3),
     }
 }
@@ -230,7 +230,12 @@ impl Soil {
     pub(crate) fn hyperbola(&self, gamma: f64, minor: f64) -> Hyperbola {
         let (power, power_slope) = self.power(minor);
         let (q_f, q_f_slope) = self.q_f(minor);
-        let q_a = q_f.max(f64::EPSILON * self.strength) / self.r_f;
+        let least = f64::EPSILON * self.strength;
+        let (q_a, q_a_slope) = if q_f > least {
+            (q_f / self.r_f, q_f_slope / self.r_f)
+        } else {
+            (least / self.r_f, 0.0)
+        };
         let y = gamma.max(0.0) * power;
         let b = self.a_i - self.a_ur + y / q_a;
         let q = 2.0 * y / (b + (b * b + 4.0 * y * self.a_ur / q_a).sqrt());
@@ -247,7 +252,7 @@ impl Soil {
         Hyperbola {
             q,
             by_gamma: by_y * power,
-            by_minor: by_y * gamma.max(0.0) * power_slope + by_q_a * q_f_slope / self.r_f,
+            by_minor: by_y * gamma.max(0.0) * power_slope + by_q_a * q_a_slope,
         }
     }
 

@@ -10,6 +10,9 @@ use crate::system::Rates;
 use abi::Failure;
 use std::array;
 
+/// Stress, over p_ref, below which errors are relative to it and not to the stress itself.
+const SMALL_STRESS: f64 = 0.02;
+
 /// Stress and internal variables on their way through an increment.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Point<const N: usize> {
@@ -133,7 +136,7 @@ impl Soil {
             p_p: second.2.p_p,
             gamma: second.2.gamma,
         };
-        let size = self.size(&s_2).max(self.size(&s_0)).max(crate::soil::FLOOR * self.p_ref);
+        let size = self.size(&s_2).max(self.size(&s_0)).max(SMALL_STRESS * self.p_ref);
         Some(Step {
             start,
             middle,
@@ -219,7 +222,7 @@ impl Soil {
     /// increment's `substeps`-th part, halved as often as need be.
     ///
     /// # Errors
-    /// The steps become too small.
+    /// The steps become too many or too small.
     #[inline]
     pub(crate) fn carry<const N: usize>(
         &self,
@@ -229,11 +232,14 @@ impl Soil {
     ) -> Result<(Point<N>, Derivative<N>), Failure> {
         /// Halvings of a step.
         const MAX_HALVINGS: u32 = 16;
+        /// Steps and attempts beyond those asked for.
+        const MAX_ATTEMPTS: u32 = 1000;
         /// A step may double where its error is below this part of the tolerance.
         const SMALL: f64 = 0.125;
         let (mut point, mut derivative) = (start, Derivative::ZERO);
         let each = 1.0 / f64::from(self.substeps);
         let mut is_first = true;
+        let mut attempts = 0;
         for part in 0..self.substeps {
             // Place in the part and size of the next step, in units of the smallest step.
             let (mut done, mut halvings) = (0_u32, 0_u32);
@@ -243,11 +249,12 @@ impl Soil {
                 let step = self.step(&point, increment, fraction);
                 let Some(step) = step.filter(|s| s.error <= self.tolerance) else {
                     halvings += 1;
-                    if halvings > MAX_HALVINGS {
+                    attempts += 1;
+                    if halvings > MAX_HALVINGS || attempts > MAX_ATTEMPTS + self.substeps {
                         let before = f64::from(done) / f64::from(1_u32 << MAX_HALVINGS);
                         return Err(Failure::CutStep {
                             factor: (f64::from(part) + before) * each,
-                            reason: "the steps that the tolerance asks for are too small",
+                            reason: "the steps that the tolerance asks for are too many or too small",
                         });
                     }
                     continue;
@@ -258,6 +265,7 @@ impl Soil {
                 }
                 point = step.end;
                 done += length;
+                attempts += 1;
                 is_first = false;
                 if step.error <= SMALL * self.tolerance && halvings > 0 && done % (2 * length) == 0 {
                     halvings -= 1;

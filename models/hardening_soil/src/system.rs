@@ -296,6 +296,23 @@ impl<'a> System<'a> {
         free <= margin - self.soil.R_t
     }
 
+    /// Whether flow on one side of the edge would carry the merged stresses past each other.
+    #[inline]
+    pub(crate) fn merges(&self, end: &Iterate) -> bool {
+        let [Lambda, mu] = end.multipliers;
+        let t = &self.trial.s;
+        let u = self.sin_psi();
+        let side = self.soil.cap.gradient(false, false);
+        let M = self.soil.cap.M;
+        let cap = mu * 2.0 * end.middle[1] / (M * M);
+        let (gap, closing) = match self.zone.merged {
+            Merged::None => return true,
+            Merged::First12 => (t[0] - t[1], 0.5 * Lambda * (1.0 - u) + cap * (side[0] - side[1])),
+            Merged::Last23 => (t[1] - t[2], 0.5 * Lambda * (1.0 + u) + cap * (side[1] - side[2])),
+        };
+        gap <= 2.0 * self.soil.G * self.trial.E * closing
+    }
+
     /// Rates of stress, p_p and γ_ps at the end; E, sin ψ_m and `start` of the result are unused.
     #[inline]
     pub(crate) fn rates(&self, end: &Iterate, of: &Rates) -> Rates {
