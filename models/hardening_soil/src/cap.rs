@@ -142,7 +142,8 @@ fn shape(soil: &Soil, E_oed: f64, K: f64) -> Option<(f64, f64)> {
     let nu = soil.nu;
     let (_, by_q, by_minor) = soil.gamma(q, s3);
     let rate = (by_q * (1.0 - K) + by_minor * K).max(0.0);
-    let [u, ..] = soil.dilatancy(s1, s3);
+    let [x, ..] = soil.mobilised(q, s3);
+    let [u, ..] = soil.dilatancy(x, x);
     let X_1 = 1.0 / E_oed - (1.0 - 2.0 * nu * K) / E - 0.5 * rate * (1.0 - u);
     let X_3 = 0.25 * rate * (1.0 + u) - (K - nu * (1.0 + K)) / E;
     let volume = X_1 + 2.0 * X_3;

@@ -49,7 +49,9 @@ impl ContinuumLaw for HardeningSoil {
     type State = State;
 
     fn new(p: SoilParameters) -> Result<Self, Refusal> {
-        Ok(Self { soil: Soil::new(&p)? })
+        Ok(Self {
+            soil: Soil::new(&p)?,
+        })
     }
 
     fn initial_state<const N: usize>(&self, stress: &[f64; N]) -> Result<State, Failure> {
@@ -74,7 +76,8 @@ impl ContinuumLaw for HardeningSoil {
             stiffening_slope: [0.0; N],
         };
         let (end, derivative) =
-            self.soil.carry(start, &increment, tangent == Tangent::Consistent)?;
+            self.soil
+                .carry(start, &increment, tangent == Tangent::Consistent)?;
         if !end.stress.iter().sum::<f64>().is_finite() {
             return Err(Failure::Numeric("the stress overflows"));
         }

@@ -94,6 +94,19 @@ impl Soil {
         s[0].abs().max(s[2].abs()).max(cohesion)
     }
 
+    /// Rate of [`size`](Self::size).
+    #[inline]
+    pub(crate) fn size_rate(&self, s: &[f64; 3], rate: &[f64; 3]) -> f64 {
+        let (major, minor) = (s[0].abs(), s[2].abs());
+        if major.max(minor) < self.c_cos_phi {
+            0.0
+        } else if major >= minor {
+            rate[0] * s[0].signum()
+        } else {
+            rate[2] * s[2].signum()
+        }
+    }
+
     /// By how much stresses lie beyond shear surface, strength, cap and cut-off, kPa.
     #[inline]
     pub(crate) fn excess(&self, s: &[f64; 3], p_p: f64, gamma: f64) -> [f64; 4] {
@@ -102,8 +115,16 @@ impl Soil {
         [
             q - self.hyperbola(gamma, s[2]).q,
             q - self.q_f(s[2]).0,
-            if p > 0.0 { self.cap.size(self.cap.q(s), p) - p_p } else { -1.0 },
-            if self.is_cut_off { -self.R_t - s[2] } else { -1.0 },
+            if p > 0.0 {
+                self.cap.size(self.cap.q(s), p) - p_p
+            } else {
+                -1.0
+            },
+            if self.is_cut_off {
+                -self.R_t - s[2]
+            } else {
+                -1.0
+            },
         ]
     }
 
@@ -145,7 +166,11 @@ impl Soil {
         } else {
             Merged::None
         };
-        zone.merged = if zone.shear == Shear::None && !zone.cap { Merged::None } else { base };
+        zone.merged = if zone.shear == Shear::None && !zone.cap {
+            Merged::None
+        } else {
+            base
+        };
         let mut multipliers = [0.0; 2];
         if let Some((guess, iterate)) = guess.and_then(|end| Some((end.zone, end.iterate?))) {
             (zone, multipliers) = (guess, iterate.multipliers);
@@ -192,7 +217,10 @@ impl Soil {
                     for (x, is_active) in multipliers.iter_mut().zip(is_active) {
                         *x = if is_active { *x } else { 0.0 };
                     }
-                    zone = Zone { merged: base, ..other };
+                    zone = Zone {
+                        merged: base,
+                        ..other
+                    };
                     if zone.shear == Shear::None && !zone.cap {
                         zone.merged = Merged::None;
                     }
@@ -209,7 +237,10 @@ impl Soil {
     #[inline]
     fn corner(&self, trial: &Trial) -> End {
         End {
-            zone: Zone { corner: true, ..Zone::ELASTIC },
+            zone: Zone {
+                corner: true,
+                ..Zone::ELASTIC
+            },
             s: [-self.R_t; 3],
             p_p: trial.p_p,
             gamma: trial.gamma,
@@ -227,20 +258,34 @@ impl Soil {
         if zone.merged == Merged::None {
             if over_12.max(over_23) > 0.0 {
                 let first = over_12 > over_23;
-                return Verdict::Merge(if first { Merged::First12 } else { Merged::Last23 });
+                return Verdict::Merge(if first {
+                    Merged::First12
+                } else {
+                    Merged::Last23
+                });
             }
         } else if s[0] < s[2] - margin {
             let is_strength = zone.shear == Shear::Limit || zone.tension;
-            return if is_strength { Verdict::Corner } else { Verdict::None };
+            return if is_strength {
+                Verdict::Corner
+            } else {
+                Verdict::None
+            };
         }
         if zone.shear != Shear::None && Lambda < 0.0 {
-            return Verdict::Other(Zone { shear: Shear::None, ..zone });
+            return Verdict::Other(Zone {
+                shear: Shear::None,
+                ..zone
+            });
         }
         if zone.cap && mu < 0.0 {
             return Verdict::Other(Zone { cap: false, ..zone });
         }
         if zone.tension && !system.needs_cut_off(end, margin) {
-            return Verdict::Other(Zone { tension: false, ..zone });
+            return Verdict::Other(Zone {
+                tension: false,
+                ..zone
+            });
         }
         let gamma = trial.gamma + system.weight().0 * Lambda;
         let gamma = match zone.shear {
@@ -249,7 +294,10 @@ impl Soil {
             Shear::Limit => {
                 let (reached, ..) = self.gamma(s[0] - s[2], s[2]);
                 if may_harden && reached > gamma * (1.0 + MARGIN) {
-                    return Verdict::Other(Zone { shear: Shear::Hardening, ..zone });
+                    return Verdict::Other(Zone {
+                        shear: Shear::Hardening,
+                        ..zone
+                    });
                 }
                 reached.max(trial.gamma)
             }

@@ -45,8 +45,8 @@ abi::parameters! {
         scheme_tolerance: Parameter::new(c"ε_s", c"-")
             .above(0.0)
             .below(1.0)
-            .usual(1e-5, 1e-2)
-            .default(1e-3),
+            .usual(1e-3, 0.5)
+            .default(0.05),
     }
 }
 
@@ -126,8 +126,7 @@ impl Soil {
         let e_i = 2.0 * p.e_50_ref / (2.0 - p.r_f);
         let E_ur = or(p.e_ur_ref, 3.0 * p.e_50_ref);
         if E_ur <= e_i {
-            let reason =
-                format!("{E_ur} kPa must exceed e_i = 2 e_50_ref/(2 - r_f) = {e_i} kPa");
+            let reason = format!("{E_ur} kPa must exceed e_i = 2 e_50_ref/(2 - r_f) = {e_i} kPa");
             return Err(Refusal::new("e_ur_ref", reason));
         }
         let sin_psi = p.dilatancy_angle.to_radians().sin();
@@ -216,7 +215,11 @@ impl Soil {
         let (power, power_slope) = self.power(minor);
         let (q_f, q_f_slope) = self.q_f(minor);
         let q_a = q_f / self.r_f;
-        let x = if q > 0.0 { (q / q_a).min(self.r_f) } else { 0.0 };
+        let x = if q > 0.0 {
+            (q / q_a).min(self.r_f)
+        } else {
+            0.0
+        };
         let left = 1.0 - x;
         let gamma = (self.a_i * q / left - self.a_ur * q) / power;
         let by_q = (self.a_i / (left * left) - self.a_ur) / power;
@@ -256,39 +259,65 @@ impl Soil {
         }
     }
 
-    /// sin ψ_m and its derivatives by the major and the minor stress, Eqs. (6) to (8).
+    /// sin φ_m and its derivatives by q and by the minor stress, Eq. (6); at most sin φ.
     #[inline]
-    pub(crate) fn dilatancy(&self, major: f64, minor: f64) -> [f64; 3] {
-        const STILL: f64 = 0.75;
-        let sum = (major + minor) * self.sin_phi + 2.0 * self.c_cos_phi;
-        let q = major - minor;
-        if sum <= 0.0 || q * self.sin_phi >= sum * self.sin_phi {
-            return [self.sin_psi, 0.0, 0.0];
+    pub(crate) fn mobilised(&self, q: f64, minor: f64) -> [f64; 3] {
+        let sum = (q + 2.0 * minor) * self.sin_phi + 2.0 * self.c_cos_phi;
+        if q <= 0.0 || sum <= 0.0 || q > sum * (1.0 + 1e-9) {
+            return [if q <= 0.0 { 0.0 } else { self.sin_phi }, 0.0, 0.0];
         }
-        let mobilised = q * self.sin_phi / sum;
-        if mobilised < STILL * self.sin_phi {
+        let x = q * self.sin_phi / sum;
+        [
+            x,
+            self.sin_phi * (1.0 - x) / sum,
+            -2.0 * self.sin_phi * x / sum,
+        ]
+    }
+
+    /// sin ψ_m of flow from one sin φ_m to another and its derivatives by them, Eqs. (7) and (8): the mean over
+    /// the part with dilatancy, and none over the rest.
+    #[inline]
+    pub(crate) fn dilatancy(&self, from: f64, to: f64) -> [f64; 3] {
+        const STILL: f64 = 0.75;
+        let rowe = |x: f64| {
+            let below = 1.0 - x * self.sin_cv;
+            let u = ((x - self.sin_cv) / below).clamp(0.0, self.sin_psi);
+            (u, (1.0 - self.sin_cv * self.sin_cv) / (below * below))
+        };
+        let least = (STILL * self.sin_phi).max(self.sin_cv);
+        let (low, high) = (from.min(to), from.max(to));
+        if high <= least {
             return [0.0; 3];
         }
-        let below = 1.0 - mobilised * self.sin_cv;
-        let rowe = (mobilised - self.sin_cv) / below;
-        if rowe <= 0.0 || mobilised >= self.sin_phi {
-            return [rowe.clamp(0.0, self.sin_psi), 0.0, 0.0];
+        let (u_high, slope_high) = rowe(high);
+        let [u, by_low, by_high] = if low >= least {
+            let (u_low, slope_low) = rowe(low);
+            [0.5 * (u_low + u_high), 0.5 * slope_low, 0.5 * slope_high]
+        } else {
+            let mean = 0.5 * (rowe(least).0 + u_high);
+            let share = (high - least) / (high - low);
+            let by_share = mean / (high - low);
+            [
+                mean * share,
+                by_share * share,
+                by_share * (1.0 - share) + 0.5 * slope_high * share,
+            ]
+        };
+        if from <= to {
+            [u, by_low, by_high]
+        } else {
+            [u, by_high, by_low]
         }
-        let by_mobilised = (1.0 - self.sin_cv * self.sin_cv) / (below * below);
-        let by_q = self.sin_phi / sum;
-        let by_sum = -mobilised / sum * self.sin_phi;
-        [
-            rowe,
-            by_mobilised * (by_q + by_sum),
-            by_mobilised * (by_sum - by_q),
-        ]
     }
 
     /// p_p and γ_ps where a calculation starts, from principal stresses in descending order, Eqs. (18) and (19).
     pub(crate) fn start(&self, s: &[f64; 3]) -> [f64; 2] {
         let [s1, _, s3] = *s;
         let past = self.ocr * s1 + self.pop;
-        let k_0 = self.cap.size((past * (1.0 - self.k_0)).abs(), past * (1.0 + 2.0 * self.k_0) / 3.0);
+        let k_0 = self.cap.size(
+            (past * (1.0 - self.k_0)).abs(),
+            past * (1.0 + 2.0 * self.k_0) / 3.0,
+        );
         let now = self.cap.size(self.cap.q(s), s.iter().sum::<f64>() / 3.0);
         let p_p = k_0.max(now).max(FLOOR * self.p_ref);
         let q = (s1 - s3).min(self.q_f(s3).0).max(0.0);

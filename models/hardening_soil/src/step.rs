@@ -3,7 +3,7 @@
 //!
 //! Compression is positive here.
 
-use crate::return_mapping::{End, MARGIN, Trial};
+use crate::return_mapping::{End, Trial};
 use crate::soil::Soil;
 use crate::spectral::Principal;
 use crate::system::Rates;
@@ -12,6 +12,15 @@ use std::array;
 
 /// Stress, over p_ref, below which errors are relative to it and not to the stress itself.
 const SMALL_STRESS: f64 = 0.02;
+
+/// How near the cap, over the stress, a step counts as beginning on it.
+const NEARLY: f64 = 1e-4;
+
+/// Halvings of a step.
+const MAX_HALVINGS: u32 = 16;
+
+/// Steps, whole ones and halves, in an increment.
+const MAX_ATTEMPTS: u32 = 2000;
 
 /// Stress and internal variables on their way through an increment.
 #[derive(Clone, Copy, Debug)]
@@ -29,12 +38,28 @@ pub(crate) struct Derivative<const N: usize> {
 
 impl<const N: usize> Derivative<N> {
     const ZERO: Self = Self {
-        columns: [Point { stress: [0.0; N], p_p: 0.0, gamma: 0.0 }; N],
+        columns: [Point {
+            stress: [0.0; N],
+            p_p: 0.0,
+            gamma: 0.0,
+        }; N],
     };
 
     /// ∂stress/∂strain, row by row.
     pub(crate) fn tangent(&self) -> [[f64; N]; N] {
         array::from_fn(|i| array::from_fn(|j| self.columns[j].stress[i]))
+    }
+}
+
+impl<const N: usize> Point<N> {
+    /// This point and `other`, by their weights.
+    #[inline]
+    fn sum(&self, own: f64, factor: f64, other: &Self) -> Self {
+        Self {
+            stress: array::from_fn(|i| own * self.stress[i] + factor * other.stress[i]),
+            p_p: own * self.p_p + factor * other.p_p,
+            gamma: own * self.gamma + factor * other.gamma,
+        }
     }
 }
 
@@ -47,16 +72,28 @@ pub(crate) struct Increment<const N: usize> {
     pub(crate) stiffening_slope: [f64; N],
 }
 
+/// A part of an increment.
+#[derive(Clone, Copy)]
+struct Part<'a, const N: usize> {
+    increment: &'a Increment<N>,
+    fraction: f64,
+    /// Whether the increment begins with it.
+    is_first: bool,
+    with_derivative: bool,
+}
+
 /// Both passes of a step.
 struct Step<const N: usize> {
     start: Principal<N>,
+    /// sin φ_m where shear flow begins, with its derivatives by γ_ps and by the minor stress.
+    mobilised: [f64; 3],
     /// Minor stress at mid-step.
     middle: f64,
     passes: [(Principal<N>, Trial, End); 2],
-    /// Whether the shear surface was active at the start.
-    is_hardening: bool,
     strain: [f64; N],
     end: Point<N>,
+    /// Size that the error is relative to, kPa.
+    size: f64,
     error: f64,
 }
 
@@ -90,28 +127,22 @@ impl Soil {
 
     /// One step: Eqs. (13) to (15). None if a return fails.
     #[inline]
-    fn step<const N: usize>(
-        &self,
-        from: &Point<N>,
-        increment: &Increment<N>,
-        fraction: f64,
-    ) -> Option<Step<N>> {
-        let strain = increment.strain.map(|e| fraction * e);
+    fn step<const N: usize>(&self, from: &Point<N>, part: &Part<'_, N>) -> Option<Step<N>> {
+        let strain = part.increment.strain.map(|e| part.fraction * e);
         let unit = self.unit_stress(&strain);
         let start = Principal::of(&from.stress);
         let s_0 = start.values;
-        let margin = 100.0 * MARGIN * self.size(&s_0);
-        let [shear, limit, cap, _] = self.excess(&s_0, from.p_p, from.gamma);
-        let is_hardening = shear > -margin || limit > -margin;
-        let pass = |E: f64, sin_psi: Option<f64>, theta: f64, guess: Option<&End>| {
+        let begin = self.hyperbola(from.gamma, s_0[2]);
+        let [x_0, by_q, by_minor] = self.mobilised(begin.q, s_0[2]);
+        let mobilised = [x_0, by_q * begin.by_gamma, by_q * begin.by_minor + by_minor];
+        let pass = |E: f64, sin_psi: f64, theta: f64, guess: Option<&End>| {
             let trial: [f64; N] = array::from_fn(|i| from.stress[i] + E * unit[i]);
             let principal = Principal::of(&trial);
-            let s = principal.values;
             let trial = Trial {
-                s,
+                s: principal.values,
                 start: s_0,
                 E,
-                sin_psi: sin_psi.unwrap_or_else(|| self.dilatancy(s[0], s[2])[0]),
+                sin_psi,
                 sin_psi_limit: self.sin_psi,
                 p_p: from.p_p,
                 gamma: from.gamma,
@@ -120,57 +151,78 @@ impl Soil {
             let end = self.return_stress(&trial, guess)?;
             Some((principal, trial, end))
         };
-        let [u_0, ..] = self.dilatancy(s_0[0], s_0[2]);
-        let stiffness = |minor| increment.stiffening * self.stiffness(minor).0;
-        let first = pass(stiffness(s_0[2]), is_hardening.then_some(u_0), 1.0, None)?;
+        let stiffness = |minor| part.increment.stiffening * self.stiffness(minor).0;
+        let first = pass(stiffness(s_0[2]), self.dilatancy(x_0, x_0)[0], 1.0, None)?;
         let s_1 = first.2.s;
         let middle = 0.5 * (s_0[2] + s_1[2]);
-        let [u_1, ..] = self.dilatancy(s_1[0], s_1[2]);
-        let u = if is_hardening { 0.5 * (u_0 + u_1) } else { u_1 };
-        let theta = if cap > -margin { 0.5 } else { 1.0 };
-        let second = pass(stiffness(middle), Some(u), theta, Some(&first.2))?;
+        let [x_1, ..] = self.mobilised(s_1[0] - s_1[2], s_1[2]);
+        let [.., cap, _] = self.excess(&s_0, from.p_p, from.gamma);
+        let is_on_cap = cap > -NEARLY * self.size(&s_0);
+        let theta = if is_on_cap { 0.5 } else { 1.0 };
+        let [u, ..] = self.dilatancy(x_0, x_1);
+        let second = pass(stiffness(middle), u, theta, Some(&first.2))?;
         let s_2 = second.2.s;
         let off = (0..3).map(|i| (s_2[i] - s_1[i]).abs()).fold(0.0, f64::max);
-        let end = Point {
-            stress: second.0.compose(&s_2),
-            p_p: second.2.p_p,
-            gamma: second.2.gamma,
-        };
-        let size = self.size(&s_2).max(self.size(&s_0)).max(SMALL_STRESS * self.p_ref);
+        let size = self.size(&s_0).max(SMALL_STRESS * self.p_ref);
         Some(Step {
             start,
+            mobilised,
             middle,
-            passes: [first, second],
-            is_hardening,
             strain,
-            end,
+            end: Point {
+                stress: second.0.compose(&s_2),
+                p_p: second.2.p_p,
+                gamma: second.2.gamma,
+            },
+            passes: [first, second],
+            size,
             error: off / size,
         })
     }
 
-    /// The derivative of a step's end, from that of its start.
+    /// The derivative of a step's end, and of its error, from the derivative of its start.
     #[inline]
     fn differentiate<const N: usize>(
         &self,
         step: &Step<N>,
         from: &Derivative<N>,
-        increment: &Increment<N>,
-        fraction: f64,
-        is_first: bool,
-    ) -> Derivative<N> {
+        part: &Part<'_, N>,
+    ) -> (Derivative<N>, [f64; N]) {
         let [(axes_1, trial_1, end_1), (axes_2, trial_2, end_2)] = &step.passes;
+        let Increment {
+            stiffening,
+            stiffening_slope,
+            ..
+        } = part.increment;
         let unit = self.unit_stress(&step.strain);
         let s_0 = step.start.values;
         let (E_0, E_0_slope) = self.stiffness(s_0[2]);
         let (E, E_slope) = self.stiffness(step.middle);
-        let u_0 = self.dilatancy(s_0[0], s_0[2]);
-        let u_1 = self.dilatancy(end_1.s[0], end_1.s[2]);
-        let u_trial = self.dilatancy(trial_1.s[0], trial_1.s[2]);
-        let along = |u: &[f64; 3], s: &[f64; 3]| u[1] * s[0] + u[2] * s[2];
+        let [x_0, x_0_by_gamma, x_0_by_minor] = step.mobilised;
+        let s_1 = end_1.s;
+        let [x_1, x_1_by_q, x_1_by_minor] = self.mobilised(s_1[0] - s_1[2], s_1[2]);
+        let at_0 = self.dilatancy(x_0, x_0);
+        let over = self.dilatancy(x_0, x_1);
+        let worst = (0..3).fold(0, |worst, i| {
+            let off = |i: usize| (end_2.s[i] - s_1[i]).abs();
+            if off(i) > off(worst) { i } else { worst }
+        });
+        let sign = (end_2.s[worst] - s_1[worst]).signum();
+        let by_size = if self.size(&s_0) > SMALL_STRESS * self.p_ref {
+            step.error
+        } else {
+            0.0
+        };
         let (start, turn_1, turn_2) = (step.start.turn(), axes_1.turn(), axes_2.turn());
+        let mut error = [0.0; N];
         let columns = array::from_fn(|j| {
             let column = &from.columns[j];
-            let d_s_0 = if is_first { [0.0; 3] } else { start.normal(&column.stress) };
+            let d_s_0 = if part.is_first {
+                [0.0; 3]
+            } else {
+                start.normal(&column.stress)
+            };
+            let d_x_0 = x_0_by_gamma * column.gamma + x_0_by_minor * d_s_0[2];
             let mut of = Rates {
                 start: d_s_0,
                 p_p: column.p_p,
@@ -178,30 +230,24 @@ impl Soil {
                 ..Rates::default()
             };
             let mut strain = [0.0; N];
-            strain[j] = fraction;
+            strain[j] = part.fraction;
             let d_unit = self.unit_stress(&strain);
-            let stiffening = increment.stiffening_slope[j];
             let trial = |E: f64, d_E: f64| -> [f64; N] {
                 array::from_fn(|i| column.stress[i] + E * d_unit[i] + d_E * unit[i])
             };
-            of.E = increment.stiffening * E_0_slope * d_s_0[2] + stiffening * E_0;
+            of.E = stiffening * E_0_slope * d_s_0[2] + stiffening_slope[j] * E_0;
             of.s = turn_1.normal(&trial(trial_1.E, of.E));
-            of.sin_psi = if step.is_hardening {
-                along(&u_0, &d_s_0)
-            } else {
-                along(&u_trial, &of.s)
-            };
+            of.sin_psi = (at_0[1] + at_0[2]) * d_x_0;
             let d_s_1 = self.end_rates(trial_1, end_1, &of).s;
             let d_middle = 0.5 * (d_s_0[2] + d_s_1[2]);
-            of.E = increment.stiffening * E_slope * d_middle + stiffening * E;
+            of.E = stiffening * E_slope * d_middle + stiffening_slope[j] * E;
             let moved = turn_2.stress(&trial(trial_2.E, of.E));
             of.s = [moved[0], moved[1], moved[2]];
-            of.sin_psi = if step.is_hardening {
-                0.5 * (along(&u_0, &d_s_0) + along(&u_1, &d_s_1))
-            } else {
-                along(&u_1, &d_s_1)
-            };
+            let d_x_1 = x_1_by_q * (d_s_1[0] - d_s_1[2]) + x_1_by_minor * d_s_1[2];
+            of.sin_psi = over[1] * d_x_0 + over[2] * d_x_1;
             let end = self.end_rates(trial_2, end_2, &of);
+            let d_size = by_size * self.size_rate(&s_0, &d_s_0);
+            error[j] = (sign * (end.s[worst] - d_s_1[worst]) - d_size) / step.size;
             let kept: [f64; N] = array::from_fn(|i| {
                 if i < 3 {
                     end.s[i]
@@ -215,11 +261,10 @@ impl Soil {
                 gamma: end.gamma,
             }
         });
-        Derivative { columns }
+        (Derivative { columns }, error)
     }
 
-    /// Carries a point over an increment in steps, each as large as the tolerance permits: the
-    /// increment's `substeps`-th part, halved as often as need be.
+    /// Carries a point over an increment.
     ///
     /// # Errors
     /// The steps become too many or too small.
@@ -230,48 +275,76 @@ impl Soil {
         increment: &Increment<N>,
         with_derivative: bool,
     ) -> Result<(Point<N>, Derivative<N>), Failure> {
-        /// Halvings of a step.
-        const MAX_HALVINGS: u32 = 16;
-        /// Steps and attempts beyond those asked for.
-        const MAX_ATTEMPTS: u32 = 1000;
-        /// A step may double where its error is below this part of the tolerance.
-        const SMALL: f64 = 0.125;
-        let (mut point, mut derivative) = (start, Derivative::ZERO);
-        let each = 1.0 / f64::from(self.substeps);
-        let mut is_first = true;
-        let mut attempts = 0;
-        for part in 0..self.substeps {
-            // Place in the part and size of the next step, in units of the smallest step.
-            let (mut done, mut halvings) = (0_u32, 0_u32);
-            while done < 1 << MAX_HALVINGS {
-                let length = 1_u32 << (MAX_HALVINGS - halvings);
-                let fraction = each / f64::from(1_u32 << halvings);
-                let step = self.step(&point, increment, fraction);
-                let Some(step) = step.filter(|s| s.error <= self.tolerance) else {
-                    halvings += 1;
-                    attempts += 1;
-                    if halvings > MAX_HALVINGS || attempts > MAX_ATTEMPTS + self.substeps {
-                        let before = f64::from(done) / f64::from(1_u32 << MAX_HALVINGS);
-                        return Err(Failure::CutStep {
-                            factor: (f64::from(part) + before) * each,
-                            reason: "the steps that the tolerance asks for are too many or too small",
-                        });
-                    }
-                    continue;
-                };
-                if with_derivative {
-                    derivative =
-                        self.differentiate(&step, &derivative, increment, fraction, is_first);
-                }
-                point = step.end;
-                done += length;
-                attempts += 1;
-                is_first = false;
-                if step.error <= SMALL * self.tolerance && halvings > 0 && done % (2 * length) == 0 {
-                    halvings -= 1;
-                }
-            }
+        let mut at = (start, Derivative::ZERO);
+        let mut part = Part {
+            increment,
+            fraction: 1.0 / f64::from(self.substeps),
+            is_first: true,
+            with_derivative,
+        };
+        let mut attempts = MAX_ATTEMPTS;
+        for done in 0..self.substeps {
+            at = self
+                .advance(&at, &part, MAX_HALVINGS, &mut attempts)
+                .ok_or(Failure::CutStep {
+                    factor: (f64::from(done) + 0.25) * part.fraction,
+                    reason: "the steps that the tolerance asks for are too many or too small",
+                })?;
+            part.is_first = false;
         }
-        Ok((point, derivative))
+        Ok(at)
+    }
+
+    /// A part of the increment in one step, in two halves, or a mean of both in proportion to the error, so that
+    /// the result is continuous. None if the steps become too many or too small.
+    fn advance<const N: usize>(
+        &self,
+        from: &(Point<N>, Derivative<N>),
+        part: &Part<'_, N>,
+        halvings: u32,
+        attempts: &mut u32,
+    ) -> Option<(Point<N>, Derivative<N>)> {
+        *attempts = attempts.checked_sub(1)?;
+        let whole = self.step(&from.0, part);
+        // How far the error is from half the tolerance to all of it.
+        let excess = |s: &Step<N>| (2.0 * s.error / self.tolerance - 1.0).clamp(0.0, 1.0);
+        let whole = whole.filter(|step| excess(step) < 1.0);
+        let weighed = whole.map(|step| {
+            let (derivative, error) = if part.with_derivative {
+                self.differentiate(&step, &from.1, part)
+            } else {
+                (Derivative::ZERO, [0.0; N])
+            };
+            (step.end, derivative, excess(&step), error)
+        });
+        if let Some((end, derivative, weight, _)) = weighed
+            && weight <= 0.0
+        {
+            return Some((end, derivative));
+        }
+        let halvings = halvings.checked_sub(1)?;
+        let mut half = Part {
+            fraction: 0.5 * part.fraction,
+            ..*part
+        };
+        let middle = self.advance(from, &half, halvings, attempts)?;
+        half.is_first = false;
+        let halves = self.advance(&middle, &half, halvings, attempts)?;
+        let Some((end, derivative, excess, error)) = weighed else {
+            return Some(halves);
+        };
+        // Smooth at both ends.
+        let weight = excess * excess * (3.0 - 2.0 * excess);
+        let slope = 6.0 * excess * (1.0 - excess) * 2.0 / self.tolerance;
+        let mut mean = (end.sum(1.0 - weight, weight, &halves.0), Derivative::ZERO);
+        if part.with_derivative {
+            let change = halves.0.sum(1.0, -1.0, &end);
+            mean.1.columns = array::from_fn(|j| {
+                derivative.columns[j]
+                    .sum(1.0 - weight, weight, &halves.1.columns[j])
+                    .sum(1.0, slope * error[j], &change)
+            });
+        }
+        Some(mean)
     }
 }

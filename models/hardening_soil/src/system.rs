@@ -85,13 +85,11 @@ const THIRD: [f64; 3] = [1.0 / 3.0; 3];
 
 impl<'a> System<'a> {
     #[inline]
-    pub(crate) fn new(
-        soil: &'a Soil,
-        trial: &'a Trial,
-        zone: Zone,
-        hardening: Hardening,
-    ) -> Self {
-        let a = soil.cap.gradient(zone.merged == Merged::First12, zone.merged == Merged::Last23);
+    pub(crate) fn new(soil: &'a Soil, trial: &'a Trial, zone: Zone, hardening: Hardening) -> Self {
+        let a = soil.cap.gradient(
+            zone.merged == Merged::First12,
+            zone.merged == Merged::Last23,
+        );
         let mut system = Self {
             soil,
             trial,
@@ -101,7 +99,7 @@ impl<'a> System<'a> {
             by_shear: [0.0; 3],
             by_p: [0.0; 3],
             by_q: [0.0; 3],
-            start: [mean(&trial.start), dot(&a, &trial.start)],
+            start: [mean(&trial.start), soil.cap.q(&trial.start)],
             hardening,
         };
         system.s = system.condensed(&trial.s, soil.R_t);
@@ -196,7 +194,10 @@ impl<'a> System<'a> {
             return *direct;
         }
         let (pp, pq) = (1.0 + w * mean(&self.by_p), w * mean(&self.by_q));
-        let (qp, qq) = (w * dot(&self.a, &self.by_p), 1.0 + w * dot(&self.a, &self.by_q));
+        let (qp, qq) = (
+            w * dot(&self.a, &self.by_p),
+            1.0 + w * dot(&self.a, &self.by_q),
+        );
         let (p, q) = (mean(direct), dot(&self.a, direct));
         let scale = 1.0 / (pp * qq - pq * qp);
         let (p, q) = ((qq * p - pq * q) * scale, (pp * q - qp * p) * scale);
@@ -251,7 +252,11 @@ impl<'a> System<'a> {
             end.gradient[0] = [1.0, 0.0, -1.0 - by_minor];
             end.jacobian[0] = [
                 dot(&end.gradient[0], &end.by_multiplier[0]) + end.by_gamma * weight,
-                if self.zone.cap { dot(&end.gradient[0], &end.by_multiplier[1]) } else { 0.0 },
+                if self.zone.cap {
+                    dot(&end.gradient[0], &end.by_multiplier[1])
+                } else {
+                    0.0
+                },
             ];
         }
         if self.zone.cap {
@@ -307,8 +312,14 @@ impl<'a> System<'a> {
         let cap = mu * 2.0 * end.middle[1] / (M * M);
         let (gap, closing) = match self.zone.merged {
             Merged::None => return true,
-            Merged::First12 => (t[0] - t[1], 0.5 * Lambda * (1.0 - u) + cap * (side[0] - side[1])),
-            Merged::Last23 => (t[1] - t[2], 0.5 * Lambda * (1.0 + u) + cap * (side[1] - side[2])),
+            Merged::First12 => (
+                t[0] - t[1],
+                0.5 * Lambda * (1.0 - u) + cap * (side[0] - side[1]),
+            ),
+            Merged::Last23 => (
+                t[1] - t[2],
+                0.5 * Lambda * (1.0 + u) + cap * (side[1] - side[2]),
+            ),
         };
         gap <= 2.0 * self.soil.G * self.trial.E * closing
     }
@@ -322,16 +333,28 @@ impl<'a> System<'a> {
         let mut direct = self.condensed(&of.s, 0.0);
         let by_E = of.E / self.trial.E;
         direct = plus(&direct, -Lambda * by_E, &self.by_shear);
-        let u = if self.zone.shear == Shear::Hardening { of.sin_psi } else { 0.0 };
+        let u = if self.zone.shear == Shear::Hardening {
+            of.sin_psi
+        } else {
+            0.0
+        };
         if u != 0.0 {
             let zero = self.flow(0.0);
             let turn: [f64; 3] = std::array::from_fn(|i| self.flow(1.0)[i] - zero[i]);
             direct = plus(&direct, -Lambda * u, &self.elastic(&turn));
         }
-        let (p_0, q_0) = (mean(&of.start), dot(&self.a, &of.start));
+        let (p_0, q_0) = (mean(&of.start), self.soil.cap.q(&of.start));
         if self.zone.cap {
-            direct = plus(&direct, -mu * (by_E * end.middle[0] + old * p_0), &self.by_p);
-            direct = plus(&direct, -mu * (by_E * end.middle[1] + old * q_0), &self.by_q);
+            direct = plus(
+                &direct,
+                -mu * (by_E * end.middle[0] + old * p_0),
+                &self.by_p,
+            );
+            direct = plus(
+                &direct,
+                -mu * (by_E * end.middle[1] + old * q_0),
+                &self.by_q,
+            );
         }
         let fixed = self.respond(&direct, mu);
         let (weight, weight_slope) = self.weight();

@@ -6,8 +6,8 @@ mod reference;
 mod sweep;
 mod tangent;
 
+use crate::HardeningSoil;
 use crate::soil::SoilParameters;
-use crate::{HardeningSoil, State};
 use abi::{ContinuumLaw, Failure, SolidPoint, SolidResponse, Tangent};
 
 /// A dense sand.
@@ -27,7 +27,7 @@ const DENSE: SoilParameters = SoilParameters {
     ocr: 1.0,
     pop: 0.0,
     substeps: 1.0,
-    scheme_tolerance: 1e-3,
+    scheme_tolerance: 0.05,
 };
 
 /// A soft clay with some cohesion.
@@ -72,11 +72,22 @@ struct Path<'a, L: ContinuumLaw> {
     state: L::State,
 }
 
+impl<L: ContinuumLaw> Clone for Path<'_, L> {
+    fn clone(&self) -> Self {
+        Self { ..*self }
+    }
+}
+
 impl<'a, L: ContinuumLaw> Path<'a, L> {
     fn new(law: &'a L, s: [f64; 3]) -> Self {
         let stress = [s[0], s[1], s[2], 0.0, 0.0, 0.0];
         let state = law.initial_state(&stress.map(|s| -s)).unwrap();
-        Self { law, stress, strain: [0.0; 6], state }
+        Self {
+            law,
+            stress,
+            strain: [0.0; 6],
+            state,
+        }
     }
 
     fn try_update(
@@ -152,7 +163,12 @@ impl<'a, L: ContinuumLaw> Path<'a, L> {
                     break;
                 }
                 share *= 0.5;
-                assert!(share > 1e-6, "no equilibrium at {:?}, {off:?}", self.stress);
+                assert!(
+                    share > 1e-6,
+                    "no equilibrium at {:?}, {off:?}, {increment:?} {:?}",
+                    self.stress,
+                    rest(&next).map(|x| x.1)
+                );
             }
         }
         panic!("no equilibrium at {:?}", self.stress);
@@ -168,7 +184,10 @@ impl<'a, L: ContinuumLaw> Path<'a, L> {
 
 /// The largest entry.
 fn size_of<const N: usize>(matrix: &[[f64; N]; N]) -> f64 {
-    matrix.as_flattened().iter().fold(0.0, |x, y| x.max(y.abs()))
+    matrix
+        .as_flattened()
+        .iter()
+        .fold(0.0, |x, y| x.max(y.abs()))
 }
 
 /// Cramer's rule.

@@ -28,7 +28,10 @@ fn random_paths_succeed() {
     let start = std::time::Instant::now();
     let mut slowest = 0.0_f64;
     for n in 0..1000 {
-        let p = SoilParameters { ocr: random.between(1.0, 4.0), ..if n % 2 == 0 { DENSE } else { CLAY } };
+        let p = SoilParameters {
+            ocr: random.between(1.0, 4.0),
+            ..if n % 2 == 0 { DENSE } else { CLAY }
+        };
         let law = law(p);
         let s = random.between(1.0, 300.0);
         let k = random.between(0.4, 2.0);

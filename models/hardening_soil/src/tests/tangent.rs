@@ -26,7 +26,11 @@ fn check(path: &Path<'_, HardeningSoil>, increment: &[f64; 6]) -> Result<f64, Fa
 fn tangents_are_differences() {
     for p in [DENSE, CLAY] {
         let law = law(p);
-        for s in [[100.0, 100.0, 100.0], [150.0, 100.0, 80.0], [200.0, 85.0, 80.0]] {
+        for s in [
+            [100.0, 100.0, 100.0],
+            [150.0, 100.0, 80.0],
+            [200.0, 85.0, 80.0],
+        ] {
             for increment in [
                 [1e-4, 0.0, 0.0, 0.0, 0.0, 0.0],
                 [1e-3, -2e-4, -3e-4, 1e-4, 2e-4, 3e-4],
