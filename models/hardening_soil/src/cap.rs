@@ -75,19 +75,15 @@ impl Cap {
         if let Some((M, H)) = shape(soil, E_oed, soil.k_0) {
             return Ok(Self { M, H, delta });
         }
-        Err(match range(soil, E_oed) {
-            Some((low, high)) => {
-                let reason = format!(
-                    "{} is outside {low:.4} to {high:.4}, what a cap with these stiffnesses can have",
-                    soil.k_0
-                );
-                Refusal::new("k_0_nc", reason)
-            }
-            None => {
-                let reason = format!("{E_oed} kPa leaves no k_0_nc that a cap can have");
-                Refusal::new("e_oed_ref", reason)
-            }
-        })
+        let Some((low, high)) = range(soil, E_oed) else {
+            let reason = format!("{E_oed} kPa leaves no k_0_nc that a cap can have");
+            return Err(Refusal::new("e_oed_ref", reason));
+        };
+        let reason = format!(
+            "{} is outside {low:.4} to {high:.4}, what a cap with these stiffnesses can have",
+            soil.k_0
+        );
+        Err(Refusal::new("k_0_nc", reason))
     }
 
     /// q̃ of principal stresses in descending order, Eq. (9).
@@ -118,7 +114,7 @@ impl Cap {
     #[inline]
     pub(crate) fn hardening(&self, soil: &Soil, p_p: f64) -> Hardening {
         let (ratio, slope) = soil.ratio(p_p);
-        let rate = self.H * soil.to_the_m(ratio);
+        let rate = self.H * soil.raised(ratio);
         let size = ratio * soil.strength / soil.sin_phi;
         Hardening {
             start: p_p,

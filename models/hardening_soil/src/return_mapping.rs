@@ -181,7 +181,7 @@ impl Soil {
         for _ in 0..MAX_ZONES {
             let system = System::new(self, trial, zone, hardening);
             let Some(end) = solve(&system, multipliers, size) else {
-                if multipliers != [0.0; 2] {
+                if multipliers[0] + multipliers[1] > 0.0 {
                     multipliers = [0.0; 2];
                     continue;
                 }

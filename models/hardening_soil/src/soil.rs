@@ -70,6 +70,8 @@ pub(crate) struct Soil {
     pub(crate) a_i: f64,
     pub(crate) a_ur: f64,
     m: f64,
+    /// Whether m is 1/2.
+    is_root: bool,
     pub(crate) p_ref: f64,
     /// p_ref sin φ + c cos φ, kPa.
     pub(crate) strength: f64,
@@ -143,6 +145,7 @@ impl Soil {
             a_i: 2.0 / e_i,
             a_ur: 2.0 / E_ur,
             m: p.m,
+            is_root: (p.m - 0.5).abs() < f64::EPSILON,
             p_ref: p.p_ref,
             strength: p.p_ref * sin_phi + p.cohesion * cos_phi,
             r_f: p.r_f,
@@ -174,14 +177,14 @@ impl Soil {
     #[inline]
     pub(crate) fn power(&self, at: f64) -> Slope {
         let (ratio, slope) = self.ratio(at);
-        let power = self.to_the_m(ratio);
+        let power = self.raised(ratio);
         (power, self.m * power / ratio * slope)
     }
 
     /// `x` to the power m.
     #[inline]
-    pub(crate) fn to_the_m(&self, x: f64) -> f64 {
-        if self.m == 0.5 {
+    pub(crate) fn raised(&self, x: f64) -> f64 {
+        if self.is_root {
             x.sqrt()
         } else {
             x.powf(self.m)

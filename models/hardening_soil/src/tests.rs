@@ -118,7 +118,7 @@ impl<'a, L: ContinuumLaw> Path<'a, L> {
     /// One increment of the normal components; Newton's method with a line search finds the strains of led
     /// stresses.
     fn step(&mut self, lead: [Lead; 3]) {
-        let size = self.stress.iter().fold(1.0_f64, |x, y| x.max(y.abs()));
+        let size = self.stress.iter().fold(10.0_f64, |x, y| x.max(y.abs()));
         let mut increment = [0.0; 6];
         for i in 0..3 {
             if let Lead::Strain(e) = lead[i] {
@@ -136,7 +136,7 @@ impl<'a, L: ContinuumLaw> Path<'a, L> {
         let norm = |rest: &[f64; 3]| rest.iter().map(|x| x.abs()).fold(0.0, f64::max);
         let (mut end, mut off) = rest(&increment).unwrap();
         for _ in 0..100 {
-            if norm(&off) <= 1e-11 * size {
+            if norm(&off) <= 1e-10 * size {
                 self.accept(&increment, &end);
                 return;
             }

@@ -180,18 +180,14 @@ fn stretching_ends_at_the_apex_or_the_tensile_strength() {
         for i in 0..3 {
             assert_relative_eq!(path.stress[i], -end, epsilon = 1e-9);
         }
-        // Uniaxial tension of the block: the lateral stress is zero, the axial stress the smaller strength.
-        let mut path = Path::new(&law, [20.0, 20.0, 20.0]);
-        path.go([Stress(-20.0), Stress(-20.0), Stress(-20.0)], 10);
+        // Tension under a lateral stress of 1 kPa ends at the cut-off or at the strength.
+        let mut path = Path::new(&law, [20.0; 3]);
+        path.go([Stress(-19.0); 3], 10);
         path.go([Strain(-0.3), FREE, FREE], 30);
         let sin = CLAY.friction_angle.to_radians().sin();
-        let strength = 2.0 * CLAY.cohesion * (1.0 - sin * sin).sqrt() / (1.0 + sin);
-        let expected = if tensile_strength.is_nan() {
-            strength
-        } else {
-            end.min(strength)
-        };
-        assert_relative_eq!(path.stress[0], -expected, epsilon = 1e-6);
+        let k = 2.0 * sin / (1.0 - sin);
+        let expected = ((1.0 - apex * k) / (1.0 + k)).max(-end);
+        assert_relative_eq!(path.stress[0], expected, epsilon = 1e-6);
     }
 }
 

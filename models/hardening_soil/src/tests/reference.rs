@@ -3,8 +3,11 @@
 use super::{CLAY, DENSE, Lead, Path, law};
 use crate::soil::SoilParameters;
 
+/// Name, parameters, stress at the start, segments.
+type Reference = (&'static str, SoilParameters, [f64; 3], Vec<[Lead; 3]>);
+
 /// What `reference.py` calls its paths, with their parameters, overconsolidation and segments.
-fn paths() -> Vec<(&'static str, SoilParameters, [f64; 3], Vec<[Lead; 3]>)> {
+fn paths() -> Vec<Reference> {
     use Lead::{Strain, Stress};
     let free = Stress(0.0);
     let held = |e| [Strain(e), Strain(0.0), Strain(0.0)];
