@@ -31,6 +31,8 @@ pub(crate) struct Zone {
     pub(crate) merged: Merged,
     pub(crate) shear: Shear,
     pub(crate) cap: bool,
+    /// Whether the cap is its cylinder along negative p, which does not harden.
+    pub(crate) cylinder: bool,
     pub(crate) tension: bool,
     /// All stresses at the apex or at the tensile strength; nothing else then counts.
     pub(crate) corner: bool,
@@ -41,9 +43,20 @@ impl Zone {
         merged: Merged::None,
         shear: Shear::None,
         cap: false,
+        cylinder: false,
         tension: false,
         corner: false,
     };
+
+    /// The same zone without the cap.
+    #[inline]
+    fn without_cap(self) -> Self {
+        Self {
+            cap: false,
+            cylinder: false,
+            ..self
+        }
+    }
 
     #[inline]
     fn is_elastic(self) -> bool {
@@ -115,11 +128,7 @@ impl Soil {
         [
             q - self.hyperbola(gamma, s[2]).q,
             q - self.q_f(s[2]).0,
-            if p > 0.0 {
-                self.cap.size(self.cap.q(s), p) - p_p
-            } else {
-                -1.0
-            },
+            self.cap.size(self.cap.q(s), p) - p_p,
             if self.is_cut_off {
                 -self.R_t - s[2]
             } else {
@@ -135,6 +144,8 @@ impl Soil {
         let size = self.size(&trial.s);
         let margin = MARGIN * size;
         let [shear, limit, cap, tension] = self.excess(&trial.s, trial.p_p, trial.gamma);
+        // Beyond the strength, flow along it leaves less to the cap, or nothing.
+        let cap = if limit > margin { 0.0 } else { cap };
         let mut zone = Zone {
             merged: Merged::None,
             // The strength bounds the hardening from outside: its solution is where to begin.
@@ -146,8 +157,9 @@ impl Soil {
                 Shear::None
             },
             cap: cap > margin,
+            cylinder: cap > margin && trial.s.iter().sum::<f64>() <= 0.0,
             tension: tension > margin,
-            corner: false,
+            ..Zone::ELASTIC
         };
         if zone.is_elastic() {
             return Some(End {
@@ -186,7 +198,7 @@ impl Soil {
                     continue;
                 }
                 if zone.cap && zone.shear != Shear::None {
-                    zone.cap = false;
+                    zone = zone.without_cap();
                     continue;
                 }
                 return None;
@@ -254,32 +266,39 @@ impl Soil {
         let (zone, trial) = (system.zone, system.trial);
         let s = &end.s;
         let [Lambda, mu] = end.multipliers;
-        let (over_12, over_23) = (s[1] - s[0], s[2] - s[1]);
-        if zone.merged == Merged::None {
-            if over_12.max(over_23) > 0.0 {
-                let first = over_12 > over_23;
-                return Verdict::Merge(if first {
-                    Merged::First12
-                } else {
-                    Merged::Last23
-                });
-            }
-        } else if s[0] < s[2] - margin {
-            let is_strength = zone.shear == Shear::Limit || zone.tension;
-            return if is_strength {
-                Verdict::Corner
-            } else {
-                Verdict::None
-            };
-        }
         if zone.shear != Shear::None && Lambda < 0.0 {
             return Verdict::Other(Zone {
                 shear: Shear::None,
                 ..zone
             });
         }
+        if zone.cap && zone.cylinder == (end.middle[0] > 0.0) {
+            return Verdict::Other(Zone {
+                cylinder: !zone.cylinder,
+                ..zone
+            });
+        }
         if zone.cap && mu < 0.0 {
-            return Verdict::Other(Zone { cap: false, ..zone });
+            return Verdict::Other(zone.without_cap());
+        }
+        let (over_12, over_23) = (s[1] - s[0], s[2] - s[1]);
+        if zone.merged == Merged::None && over_12.max(over_23) > 0.0 {
+            let first = over_12 > over_23;
+            return Verdict::Merge(if first {
+                Merged::First12
+            } else {
+                Merged::Last23
+            });
+        }
+        if s[0] < s[2] - margin {
+            // Flow at the strength dilates: it leads to the corner from beyond it.
+            let is_beyond = trial.s.iter().sum::<f64>() <= 3.0 * (margin - self.R_t);
+            let is_strength = zone.shear == Shear::Limit || zone.tension;
+            return if is_strength && is_beyond {
+                Verdict::Corner
+            } else {
+                Verdict::None
+            };
         }
         if zone.tension && !system.needs_cut_off(end, margin) {
             return Verdict::Other(Zone {
@@ -309,7 +328,10 @@ impl Soil {
         } else if zone.shear == Shear::None && shear > margin {
             other.shear = Shear::Hardening;
         }
-        other.cap |= cap > margin;
+        if !zone.cap && cap > margin {
+            other.cap = true;
+            other.cylinder = s.iter().sum::<f64>() <= 0.0;
+        }
         other.tension |= tension > margin;
         if other == zone {
             Verdict::Ends(gamma)

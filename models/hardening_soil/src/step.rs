@@ -138,7 +138,7 @@ impl Soil {
         let pass = |E: f64, sin_psi: f64, theta: f64, guess: Option<&End>| {
             let trial: [f64; N] = array::from_fn(|i| from.stress[i] + E * unit[i]);
             let principal = Principal::of(&trial);
-            let trial = Trial {
+            let mut trial = Trial {
                 s: principal.values,
                 start: s_0,
                 E,
@@ -148,7 +148,13 @@ impl Soil {
                 gamma: from.gamma,
                 theta,
             };
-            let end = self.return_stress(&trial, guess)?;
+            let end = match self.return_stress(&trial, guess) {
+                Some(end) => end,
+                None => {
+                    trial.theta = 1.0;
+                    self.return_stress(&trial, None)?
+                }
+            };
             Some((principal, trial, end))
         };
         let stiffness = |minor| part.increment.stiffening * self.stiffness(minor).0;
@@ -345,6 +351,34 @@ impl Soil {
                     .sum(1.0, slope * error[j], &change)
             });
         }
+        self.harden(&mut mean.0, &mut mean.1);
         Some(mean)
+    }
+
+    /// Brings the surfaces to a mean of stresses, which may lie beyond those of the mean variables.
+    #[cold]
+    fn harden<const N: usize>(&self, point: &mut Point<N>, derivative: &mut Derivative<N>) {
+        let principal = Principal::of(&point.stress);
+        let s = principal.values;
+        let turn = principal.turn();
+        let [shear, _, cap, _] = self.excess(&s, point.p_p, point.gamma);
+        if shear > 0.0 {
+            let (gamma, by_q, by_minor) = self.gamma(s[0] - s[2], s[2]);
+            point.gamma = gamma;
+            for column in &mut derivative.columns {
+                let rate = turn.normal(&column.stress);
+                column.gamma = by_q * (rate[0] - rate[2]) + by_minor * rate[2];
+            }
+        }
+        if cap > 0.0 {
+            let (q, p) = (self.cap.q(&s), ((s[0] + s[1] + s[2]) / 3.0).max(0.0));
+            point.p_p = self.cap.size(q, p);
+            let by_q = q / (self.cap.M * self.cap.M * point.p_p);
+            for column in &mut derivative.columns {
+                let rate = turn.normal(&column.stress);
+                let mean = (rate[0] + rate[1] + rate[2]) / 3.0;
+                column.p_p = by_q * self.cap.q(&rate) + p / point.p_p * mean;
+            }
+        }
     }
 }

@@ -33,7 +33,7 @@ pub(crate) struct Iterate {
     /// The two conditions, kPa; 0 for a surface that is not active.
     pub(crate) residual: [f64; 2],
     /// p and q̃ that the cap's flow follows.
-    middle: [f64; 2],
+    pub(crate) middle: [f64; 2],
     /// ∂s/∂Λ and ∂s/∂μ.
     by_multiplier: [[f64; 3]; 2],
     /// Derivatives of the conditions by s, and by Λ and μ in all.
@@ -105,7 +105,9 @@ impl<'a> System<'a> {
         system.s = system.condensed(&trial.s, soil.R_t);
         let M = soil.cap.M;
         system.by_shear = system.elastic(&system.flow(system.sin_psi()));
-        system.by_p = system.elastic(&[2.0 / 3.0; 3]);
+        if !zone.cylinder {
+            system.by_p = system.elastic(&[2.0 / 3.0; 3]);
+        }
         system.by_q = system.elastic(&a.map(|a| 2.0 / (M * M) * a));
         system
     }
@@ -263,7 +265,11 @@ impl<'a> System<'a> {
             let M = soil.cap.M;
             let (p, q) = (mean(&s), dot(&self.a, &s));
             let size = soil.cap.size(q, p);
-            let hardened = self.hardening.after(2.0 * mu * middle[0]);
+            let pressure = if self.zone.cylinder { 0.0 } else { middle[0] };
+            let mut hardened = self.hardening.after(2.0 * mu * pressure);
+            if self.zone.cylinder {
+                hardened.by_strain = 0.0;
+            }
             (end.p_p, end.by_strain, end.by_start) =
                 (hardened.p_p, hardened.by_strain, hardened.by_start);
             end.residual[1] = size - hardened.p_p;
@@ -289,6 +295,7 @@ impl<'a> System<'a> {
         let [Lambda, mu] = end.multipliers;
         let shear = self.flow(self.sin_psi());
         let [p, q] = end.middle;
+        let p = if self.zone.cylinder { 0.0 } else { p };
         let flow: [f64; 3] = std::array::from_fn(|i| {
             Lambda * shear[i] + mu * (2.0 / 3.0 * p + 2.0 * q / (cap.M * cap.M) * self.a[i])
         });
