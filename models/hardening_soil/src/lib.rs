@@ -4,6 +4,8 @@
 
 mod cap;
 mod return_mapping;
+mod small;
+mod small_law;
 mod soil;
 mod spectral;
 mod step;
@@ -14,6 +16,7 @@ mod tests;
 use abi::{
     ContinuumLaw, Description, Failure, Refusal, SolidPoint, SolidResponse, Tangent, Variable,
 };
+pub use small_law::HardeningSoilSmall;
 use soil::{Soil, SoilParameters};
 use spectral::Principal;
 use step::{Increment, Point};
@@ -70,17 +73,11 @@ impl ContinuumLaw for HardeningSoil {
             p_p: point.state.p_p,
             gamma: point.state.gamma_ps,
         };
-        let increment = Increment {
-            strain: point.strain_increment.map(|e| -e),
-            stiffening: 1.0,
-            stiffening_slope: [0.0; N],
-        };
+        let increment = Increment::of(point.strain_increment.map(|e| -e));
         let (end, derivative) =
             self.soil
                 .carry(start, &increment, tangent == Tangent::Consistent)?;
-        if !end.stress.iter().sum::<f64>().is_finite() {
-            return Err(Failure::Numeric("the stress overflows"));
-        }
+        end.check()?;
         Ok(SolidResponse {
             stress: end.stress.map(|s| -s),
             state: self.state(end.p_p, end.gamma),
@@ -105,4 +102,4 @@ impl HardeningSoil {
     }
 }
 
-abi::export_laws!(continuum HardeningSoil);
+abi::export_laws!(continuum HardeningSoil, continuum HardeningSoilSmall);

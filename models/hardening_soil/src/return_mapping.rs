@@ -78,6 +78,8 @@ pub(crate) struct Trial {
     pub(crate) sin_psi_limit: f64,
     pub(crate) p_p: f64,
     pub(crate) gamma: f64,
+    /// What γ_ps grows by over the plastic shear strain.
+    pub(crate) slowing: f64,
     /// Weight of the end in the direction of the cap's flow; the rest is that of the start.
     pub(crate) theta: f64,
 }

@@ -52,6 +52,17 @@ impl<const N: usize> Derivative<N> {
 }
 
 impl<const N: usize> Point<N> {
+    /// # Errors
+    /// The stress is not finite.
+    #[inline]
+    pub(crate) fn check(&self) -> Result<(), Failure> {
+        if self.stress.iter().sum::<f64>().is_finite() {
+            Ok(())
+        } else {
+            Err(Failure::Numeric("the stress overflows"))
+        }
+    }
+
     /// This point and `other`, by their weights.
     #[inline]
     fn sum(&self, own: f64, factor: f64, other: &Self) -> Self {
@@ -70,6 +81,23 @@ pub(crate) struct Increment<const N: usize> {
     /// Young's modulus over that of unloading, and its derivative by the strain.
     pub(crate) stiffening: f64,
     pub(crate) stiffening_slope: [f64; N],
+    /// What γ_ps grows by over the plastic shear strain, and its derivative.
+    pub(crate) slowing: f64,
+    pub(crate) slowing_slope: [f64; N],
+}
+
+impl<const N: usize> Increment<N> {
+    /// An increment without effects of small strains.
+    #[inline]
+    pub(crate) fn of(strain: [f64; N]) -> Self {
+        Self {
+            strain,
+            stiffening: 1.0,
+            stiffening_slope: [0.0; N],
+            slowing: 1.0,
+            slowing_slope: [0.0; N],
+        }
+    }
 }
 
 /// A part of an increment.
@@ -146,6 +174,7 @@ impl Soil {
                 sin_psi_limit: self.sin_psi,
                 p_p: from.p_p,
                 gamma: from.gamma,
+                slowing: part.increment.slowing,
                 theta,
             };
             let end = match self.return_stress(&trial, guess) {
@@ -233,6 +262,7 @@ impl Soil {
                 start: d_s_0,
                 p_p: column.p_p,
                 gamma: column.gamma,
+                slowing: part.increment.slowing_slope[j],
                 ..Rates::default()
             };
             let mut strain = [0.0; N];

@@ -60,6 +60,7 @@ pub(crate) struct Rates {
     pub(crate) sin_psi: f64,
     pub(crate) p_p: f64,
     pub(crate) gamma: f64,
+    pub(crate) slowing: f64,
 }
 
 /// A return to known surfaces.
@@ -136,9 +137,10 @@ impl<'a> System<'a> {
     /// What γ_ps grows by with Λ, Eq. (5), and its derivative by sin ψ_m.
     #[inline]
     pub(crate) fn weight(&self) -> (f64, f64) {
+        let h = self.trial.slowing;
         match self.zone.merged {
-            Merged::First12 => (0.5 * (1.0 + self.sin_psi()), 0.5),
-            _ => (1.0, 0.0),
+            Merged::First12 => (0.5 * h * (1.0 + self.sin_psi()), 0.5 * h),
+            _ => (h, 0.0),
         }
     }
 
@@ -365,7 +367,8 @@ impl<'a> System<'a> {
         }
         let fixed = self.respond(&direct, mu);
         let (weight, weight_slope) = self.weight();
-        let gamma = of.gamma + Lambda * weight_slope * u;
+        let gamma =
+            of.gamma + Lambda * (weight_slope * u + weight / self.trial.slowing * of.slowing);
         let mut change = [0.0; 2];
         if self.zone.shear != Shear::None {
             change[0] = dot(&end.gradient[0], &fixed) + end.by_gamma * gamma;

@@ -3,6 +3,7 @@
 
 mod hallmarks;
 mod reference;
+mod small;
 mod sweep;
 mod tangent;
 
