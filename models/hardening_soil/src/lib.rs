@@ -103,3 +103,7 @@ impl HardeningSoil {
 }
 
 abi::export_laws!(continuum HardeningSoil, continuum HardeningSoilSmall);
+
+bridges::export_mfront!(continuum HardeningSoil);
+bridges::export_mfront!(continuum HardeningSoilSmall);
+bridges::export_umat!(HardeningSoil);

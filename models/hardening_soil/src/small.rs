@@ -16,8 +16,9 @@ pub(crate) struct SmallStrain {
     /// Initial shear modulus over that of unloading.
     pub(crate) initial: f64,
     gamma_07: f64,
-    /// Exponent of Eq. (27).
+    /// Exponent and factor of Eq. (27).
     exponent: f64,
+    factor: f64,
 }
 
 /// The memory of strain.
@@ -51,12 +52,63 @@ impl SmallStrain {
             let reason = format!("{G_0} kPa is below G_ur = e_ur_ref/(2 (1 + nu_ur)) = {G_ur} kPa");
             return Err(Refusal::new("g_0_ref", reason));
         }
-        Ok(Self {
+        let mut small = Self {
             initial: G_0 / G_ur,
             gamma_07,
             // 1 + E_ur/(2 E_i), from 2/E_i and 2/E_ur.
             exponent: 1.0 + 0.5 * soil.a_i / soil.a_ur,
-        })
+            factor: 1.0,
+        };
+        small.keep_secant(soil);
+        Ok(small)
+    }
+
+    /// The factor of Eq. (27), by bisection: with it the axial strain at half the strength is as without small
+    /// strains.
+    fn keep_secant(&mut self, soil: &Soil) {
+        const HALVINGS: u32 = 40;
+        let unchanged = Self {
+            initial: 1.0,
+            ..*self
+        };
+        let expected = unchanged.axial_strain(soil);
+        let (mut low, mut high) = (0.1, 1.0);
+        for _ in 0..HALVINGS {
+            self.factor = 0.5 * (low + high);
+            if self.axial_strain(soil) > expected {
+                low = self.factor;
+            } else {
+                high = self.factor;
+            }
+        }
+    }
+
+    /// Axial strain at half the strength in drained triaxial compression under p_ref, by Heun's method.
+    fn axial_strain(&self, soil: &Soil) -> f64 {
+        const STEPS: u32 = 200;
+        let s3 = soil.p_ref;
+        let E_ur = soil.stiffness(s3).0;
+        let step = 0.5 * soil.q_f(s3).0 / f64::from(STEPS);
+        // Rates of ε_a − ε_r and of ε_a by q.
+        let rates = |q: f64, gamma: f64| {
+            let ratio = self.tangent(gamma, 1.0);
+            let [x, ..] = soil.mobilised(q, s3);
+            let [u, ..] = soil.dilatancy(x, x);
+            let plastic = soil.gamma(q, s3).1 / self.slowing(ratio);
+            [
+                (1.0 + soil.nu) / (ratio * E_ur) + 0.25 * (3.0 - u) * plastic,
+                1.0 / (ratio * E_ur) + 0.5 * (1.0 - u) * plastic,
+            ]
+        };
+        let (mut gamma, mut axial) = (0.0, 0.0);
+        for i in 0..STEPS {
+            let q = f64::from(i) * step;
+            let first = rates(q, gamma);
+            let second = rates(q + step, gamma + step * first[0]);
+            gamma += 0.5 * step * (first[0] + second[0]);
+            axial += 0.5 * step * (first[1] + second[1]);
+        }
+        axial
     }
 
     /// Tangent modulus over that of unloading, Eq. (23).
@@ -81,7 +133,7 @@ impl SmallStrain {
 
     /// h of Eq. (27).
     fn slowing(&self, least: f64) -> f64 {
-        least.powf(self.exponent)
+        self.factor * least.powf(self.exponent)
     }
 
     /// The memory after a strain increment, Eqs. (24) to (26).

@@ -12,7 +12,11 @@ const G_0: f64 = 110e3;
 const GAMMA_07: f64 = 1.5e-4;
 
 fn law(soil: SoilParameters) -> HardeningSoilSmall {
-    let p = SmallParameters { soil, g_0_ref: G_0, gamma_07: GAMMA_07 };
+    let p = SmallParameters {
+        soil,
+        g_0_ref: G_0,
+        gamma_07: GAMMA_07,
+    };
     HardeningSoilSmall::new(p).unwrap()
 }
 
@@ -28,7 +32,11 @@ const CONSTANT: SoilParameters = SoilParameters { m: 0.0, ..DENSE };
 
 /// Constant volume, to ε_a − ε_r = γ.
 fn shear(gamma: f64) -> [super::Lead; 3] {
-    [Strain(gamma / 1.5), Strain(-gamma / 3.0), Strain(-gamma / 3.0)]
+    [
+        Strain(gamma / 1.5),
+        Strain(-gamma / 3.0),
+        Strain(-gamma / 3.0),
+    ]
 }
 
 #[test]
@@ -43,8 +51,14 @@ fn the_secant_at_gamma_07_is_0_722_of_the_initial() {
     // In simple shear γ_hist is √3/2 of the engineering strain.
     let path = elastic(&law);
     let gamma = 2.0 / 3.0_f64.sqrt() * GAMMA_07;
-    let end = path.try_update(&[0.0, 0.0, 0.0, gamma, 0.0, 0.0], Tangent::None).unwrap();
-    assert_relative_eq!(-end.stress[3] / gamma / G_0, 1.0 / 1.385, max_relative = 1e-9);
+    let end = path
+        .try_update(&[0.0, 0.0, 0.0, gamma, 0.0, 0.0], Tangent::None)
+        .unwrap();
+    assert_relative_eq!(
+        -end.stress[3] / gamma / G_0,
+        1.0 / 1.385,
+        max_relative = 1e-9
+    );
 }
 
 /// Far strains are those of unloading: the secant from the end of the decay is G_ur.
@@ -80,16 +94,16 @@ fn a_reversal_restores_the_stiffness_and_loops_close() {
 }
 
 #[test]
-fn the_secant_at_half_the_strength_is_near_e_50() {
+fn the_secant_at_half_the_strength_stays_e_50() {
     let law = law(SoilParameters { ocr: 20.0, ..DENSE });
-    for s3 in [50.0, 100.0, 400.0_f64] {
+    for (s3, bound) in [(50.0, 0.03), (100.0, 2e-3), (400.0_f64, 0.03)] {
         let mut path = Path::new(&law, [s3; 3]);
         let sin = DENSE.friction_angle.to_radians().sin();
         let q = s3 * sin / (1.0 - sin);
         path.go([Stress(q), Stress(0.0), Stress(0.0)], 200);
         let share = q / path.strain[0] / (DENSE.e_50_ref * (s3 / 100.0).powf(DENSE.m));
         println!("{s3} {share}");
-        assert!((share - 1.0).abs() < 0.2, "{share}");
+        assert!((share - 1.0).abs() < bound, "{s3}: {share}");
     }
 }
 
@@ -107,7 +121,10 @@ fn tangents_are_differences() {
             [1e-3, -2e-4, -3e-4, 1e-4, 2e-4, 3e-4],
         ] {
             let end = path.try_update(&increment, Tangent::Consistent).unwrap();
-            let stiffness = path.try_update(&increment, Tangent::Elastic).unwrap().tangent[0][0];
+            let stiffness = path
+                .try_update(&increment, Tangent::Elastic)
+                .unwrap()
+                .tangent[0][0];
             let differences = abi::differences::tangent(&increment, 1e-4, |moved| {
                 Ok(path.try_update(moved, Tangent::None)?.stress.map(|s| -s))
             })
@@ -124,7 +141,14 @@ fn tangents_are_differences() {
 
 #[test]
 fn an_initial_modulus_below_that_of_unloading_is_refused() {
-    let p = SmallParameters { soil: DENSE, g_0_ref: 30e3, gamma_07: GAMMA_07 };
+    let p = SmallParameters {
+        soil: DENSE,
+        g_0_ref: 30e3,
+        gamma_07: GAMMA_07,
+    };
     let message = HardeningSoilSmall::new(p).unwrap_err().to_string();
-    assert!(message.starts_with("g_0_ref: 30000 kPa is below G_ur"), "{message}");
+    assert!(
+        message.starts_with("g_0_ref: 30000 kPa is below G_ur"),
+        "{message}"
+    );
 }
