@@ -308,7 +308,7 @@ impl Soil {
                 ..zone
             });
         }
-        let gamma = trial.gamma + system.weight().0 * Lambda;
+        let gamma = trial.gamma + system.growth(Lambda)[0];
         let gamma = match zone.shear {
             Shear::None => trial.gamma,
             Shear::Hardening => gamma,

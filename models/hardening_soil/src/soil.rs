@@ -21,7 +21,7 @@ abi::parameters! {
         /// Poisson's ratio of unloading and reloading.
         nu_ur: Parameter::new(c"ν_ur", c"-").at_least(0.0).below(0.5).default(0.2),
         /// Cohesion.
-        cohesion: Parameter::new(c"c", c"kPa").at_least(0.0),
+        cohesion: Parameter::new(c"c", c"kPa").at_least(0.0).usual(0.0, 100.0),
         /// Angle of internal friction.
         friction_angle: Parameter::new(c"φ", c"deg").at_least(0.0).below(90.0).usual(15.0, 50.0),
         /// Angle of dilatancy at failure, at most the angle of friction.

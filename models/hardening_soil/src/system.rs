@@ -134,14 +134,26 @@ impl<'a> System<'a> {
         }
     }
 
-    /// What γ_ps grows by with Λ, Eq. (5), and its derivative by sin ψ_m.
+    /// What γ_ps grows by, Eq. (5), and its derivatives by Λ, sin ψ_m, and the difference of plastic strains that
+    /// an edge of equal major stresses closes.
     #[inline]
-    pub(crate) fn weight(&self) -> (f64, f64) {
+    pub(crate) fn growth(&self, Lambda: f64) -> [f64; 4] {
         let h = self.trial.slowing;
-        match self.zone.merged {
-            Merged::First12 => (0.5 * h * (1.0 + self.sin_psi()), 0.5 * h),
-            _ => (h, 0.0),
+        let u = self.sin_psi();
+        if self.zone.merged == Merged::First12 {
+            let apart = self.apart(self.trial.s[0] - self.trial.s[1]);
+            if apart < 0.5 * Lambda * (1.0 - u) {
+                let share = 0.5 * h * (1.0 + u);
+                return [share * Lambda + h * apart, share, 0.5 * h * Lambda, h];
+            }
         }
+        [h * Lambda, h, 0.0, 0.0]
+    }
+
+    /// Difference of plastic strains that makes stresses equal.
+    #[inline]
+    fn apart(&self, difference: f64) -> f64 {
+        difference / (2.0 * self.soil.G * self.trial.E)
     }
 
     /// The mean of merged stresses, and what the cut-off makes of them, Eq. (16).
@@ -243,10 +255,10 @@ impl<'a> System<'a> {
             by_start: 1.0,
         };
         if self.zone.shear != Shear::None {
-            let weight = self.weight().0;
+            let [growth, weight, ..] = self.growth(Lambda);
             let (q, by_minor);
             if self.zone.shear == Shear::Hardening {
-                let on = soil.hyperbola(self.trial.gamma + weight * Lambda, s[2]);
+                let on = soil.hyperbola(self.trial.gamma + growth, s[2]);
                 (q, by_minor) = (on.q, on.by_minor);
                 end.by_gamma = -on.by_gamma;
             } else {
@@ -366,9 +378,11 @@ impl<'a> System<'a> {
             );
         }
         let fixed = self.respond(&direct, mu);
-        let (weight, weight_slope) = self.weight();
+        let [growth, weight, by_u, by_apart] = self.growth(Lambda);
+        let difference = self.trial.s[0] - self.trial.s[1];
+        let apart = self.apart(of.s[0] - of.s[1] - by_E * difference);
         let gamma =
-            of.gamma + Lambda * (weight_slope * u + weight / self.trial.slowing * of.slowing);
+            of.gamma + by_u * u + by_apart * apart + growth / self.trial.slowing * of.slowing;
         let mut change = [0.0; 2];
         if self.zone.shear != Shear::None {
             change[0] = dot(&end.gradient[0], &fixed) + end.by_gamma * gamma;
