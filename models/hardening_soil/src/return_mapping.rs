@@ -1,0 +1,420 @@
+//! The return of principal stresses to the shear surface, the strength, the cap and the tensile cut-off:
+//! which of them are active, Eqs. (15) to (17).
+//!
+//! Compression is positive here.
+
+use crate::soil::Soil;
+use crate::system::{Iterate, Rates, System};
+use std::mem;
+
+/// What limits the shear stress.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Shear {
+    None,
+    /// The shear surface, which hardens.
+    Hardening,
+    /// The strength.
+    Limit,
+}
+
+/// Principal stresses that the return makes equal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Merged {
+    None,
+    First12,
+    Last23,
+}
+
+/// The active surfaces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Zone {
+    pub(crate) merged: Merged,
+    pub(crate) shear: Shear,
+    pub(crate) cap: bool,
+    /// Whether the cap is its cylinder along negative p, which does not harden.
+    pub(crate) cylinder: bool,
+    pub(crate) tension: bool,
+    /// All stresses at the apex or at the tensile strength; nothing else then counts.
+    pub(crate) corner: bool,
+}
+
+impl Zone {
+    pub(crate) const ELASTIC: Self = Self {
+        merged: Merged::None,
+        shear: Shear::None,
+        cap: false,
+        cylinder: false,
+        tension: false,
+        corner: false,
+    };
+
+    /// The same zone without the cap.
+    #[inline]
+    fn without_cap(self) -> Self {
+        Self {
+            cap: false,
+            cylinder: false,
+            ..self
+        }
+    }
+
+    #[inline]
+    fn is_elastic(self) -> bool {
+        self.shear == Shear::None && !self.cap && !self.tension && !self.corner
+    }
+}
+
+/// What a return starts from.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Trial {
+    /// Trial stresses, descending, kPa.
+    pub(crate) s: [f64; 3],
+    /// Principal stresses at the start, descending, kPa.
+    pub(crate) start: [f64; 3],
+    /// Young's modulus, kPa.
+    pub(crate) E: f64,
+    /// sin ψ_m of hardening, and of flow at the strength.
+    pub(crate) sin_psi: f64,
+    pub(crate) sin_psi_limit: f64,
+    pub(crate) p_p: f64,
+    pub(crate) gamma: f64,
+    /// What γ_ps grows by over the plastic shear strain.
+    pub(crate) slowing: f64,
+    /// Weight of the end in the direction of the cap's flow; the rest is that of the start.
+    pub(crate) theta: f64,
+}
+
+/// Where a trial stress returns to.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct End {
+    pub(crate) zone: Zone,
+    pub(crate) s: [f64; 3],
+    pub(crate) p_p: f64,
+    pub(crate) gamma: f64,
+    /// What the return ended with; none if it was elastic or to the corner.
+    iterate: Option<Iterate>,
+}
+
+/// Relative margin of a surface that a stress is on.
+pub(crate) const MARGIN: f64 = 1e-11;
+
+/// Attempts to find the active surfaces.
+const MAX_ZONES: u32 = 16;
+
+impl Soil {
+    /// The size that margins are relative to, kPa.
+    #[inline]
+    pub(crate) fn size(&self, s: &[f64; 3]) -> f64 {
+        let cohesion = self.c_cos_phi;
+        s[0].abs().max(s[2].abs()).max(cohesion)
+    }
+
+    /// Rate of [`size`](Self::size).
+    #[inline]
+    pub(crate) fn size_rate(&self, s: &[f64; 3], rate: &[f64; 3]) -> f64 {
+        let (major, minor) = (s[0].abs(), s[2].abs());
+        if major.max(minor) < self.c_cos_phi {
+            0.0
+        } else if major >= minor {
+            rate[0] * s[0].signum()
+        } else {
+            rate[2] * s[2].signum()
+        }
+    }
+
+    /// By how much stresses lie beyond shear surface, strength, cap and cut-off, kPa.
+    #[inline]
+    pub(crate) fn excess(&self, s: &[f64; 3], p_p: f64, gamma: f64) -> [f64; 4] {
+        let q = s[0] - s[2];
+        let p = (s[0] + s[1] + s[2]) / 3.0;
+        [
+            q - self.hyperbola(gamma, s[2]).q,
+            q - self.q_f(s[2]).0,
+            self.cap.size(self.cap.q(s), p) - p_p,
+            if self.is_cut_off {
+                -self.R_t - s[2]
+            } else {
+                -1.0
+            },
+        ]
+    }
+
+    /// Returns a trial stress, Eq. (15). None if the iterations fail: then a smaller step may not.
+    /// `guess` are zone and multipliers of a return from nearby.
+    #[inline]
+    pub(crate) fn return_stress(&self, trial: &Trial, guess: Option<&End>) -> Option<End> {
+        let size = self.size(&trial.s);
+        let margin = MARGIN * size;
+        let [shear, limit, cap, tension] = self.excess(&trial.s, trial.p_p, trial.gamma);
+        // Beyond the strength, flow along it leaves less to the cap, or nothing.
+        let cap = if limit > margin { 0.0 } else { cap };
+        let mut zone = Zone {
+            merged: Merged::None,
+            // The strength bounds the hardening from outside: its solution is where to begin.
+            shear: if limit > margin {
+                Shear::Limit
+            } else if shear > margin {
+                Shear::Hardening
+            } else {
+                Shear::None
+            },
+            cap: cap > margin,
+            cylinder: cap > margin && trial.s.iter().sum::<f64>() <= 0.0,
+            tension: tension > margin,
+            ..Zone::ELASTIC
+        };
+        if zone.is_elastic() {
+            return Some(End {
+                zone,
+                s: trial.s,
+                p_p: trial.p_p,
+                gamma: trial.gamma,
+                iterate: None,
+            });
+        }
+        let equal = |x: f64, y: f64| x - y <= margin;
+        let base = if equal(trial.s[1], trial.s[2]) {
+            Merged::Last23
+        } else if equal(trial.s[0], trial.s[1]) {
+            Merged::First12
+        } else {
+            Merged::None
+        };
+        zone.merged = if zone.shear == Shear::None && !zone.cap {
+            Merged::None
+        } else {
+            base
+        };
+        let mut multipliers = [0.0; 2];
+        if let Some((guess, iterate)) = guess.and_then(|end| Some((end.zone, end.iterate?))) {
+            (zone, multipliers) = (guess, iterate.multipliers);
+        }
+        let mut is_guess = zone.merged != base;
+        let hardening = self.cap.hardening(self, trial.p_p);
+        let mut may_harden = true;
+        for _ in 0..MAX_ZONES {
+            let system = System::new(self, trial, zone, hardening);
+            let Some(end) = solve(&system, multipliers, size) else {
+                if multipliers[0] + multipliers[1] > 0.0 {
+                    multipliers = [0.0; 2];
+                    continue;
+                }
+                if zone.cap && zone.shear != Shear::None {
+                    zone = zone.without_cap();
+                    continue;
+                }
+                return None;
+            };
+            multipliers = end.multipliers.map(|x| x.max(0.0));
+            if mem::take(&mut is_guess) && !system.merges(&end) {
+                zone.merged = base;
+                continue;
+            }
+            match self.judge(&system, &end, margin, may_harden) {
+                Verdict::Ends(gamma) => {
+                    return Some(End {
+                        zone,
+                        s: end.s,
+                        p_p: end.p_p,
+                        gamma,
+                        iterate: Some(end),
+                    });
+                }
+                Verdict::Corner => return Some(self.corner(trial)),
+                Verdict::None => return None,
+                Verdict::Merge(merged) => zone.merged = merged,
+                Verdict::Other(other) => {
+                    if zone.shear == Shear::Limit && other.shear == Shear::Hardening {
+                        may_harden = false;
+                    }
+                    let is_active = [other.shear != Shear::None, other.cap];
+                    for (x, is_active) in multipliers.iter_mut().zip(is_active) {
+                        *x = if is_active { *x } else { 0.0 };
+                    }
+                    zone = Zone {
+                        merged: base,
+                        ..other
+                    };
+                    if zone.shear == Shear::None && !zone.cap {
+                        zone.merged = Merged::None;
+                    }
+                    if zone.is_elastic() {
+                        return None;
+                    }
+                }
+            }
+        }
+        None
+    }
+
+    /// All stresses at the apex or the tensile strength.
+    #[inline]
+    fn corner(&self, trial: &Trial) -> End {
+        End {
+            zone: Zone {
+                corner: true,
+                ..Zone::ELASTIC
+            },
+            s: [-self.R_t; 3],
+            p_p: trial.p_p,
+            gamma: trial.gamma,
+            iterate: None,
+        }
+    }
+
+    /// Whether a solution with these active surfaces is the return.
+    #[inline]
+    fn judge(&self, system: &System<'_>, end: &Iterate, margin: f64, may_harden: bool) -> Verdict {
+        let (zone, trial) = (system.zone, system.trial);
+        let s = &end.s;
+        let [Lambda, mu] = end.multipliers;
+        if zone.shear != Shear::None && Lambda < 0.0 {
+            return Verdict::Other(Zone {
+                shear: Shear::None,
+                ..zone
+            });
+        }
+        if zone.cap && zone.cylinder == (end.middle[0] > 0.0) {
+            return Verdict::Other(Zone {
+                cylinder: !zone.cylinder,
+                ..zone
+            });
+        }
+        if zone.cap && mu < 0.0 {
+            return Verdict::Other(zone.without_cap());
+        }
+        let (over_12, over_23) = (s[1] - s[0], s[2] - s[1]);
+        if zone.merged == Merged::None && over_12.max(over_23) > 0.0 {
+            let first = over_12 > over_23;
+            return Verdict::Merge(if first {
+                Merged::First12
+            } else {
+                Merged::Last23
+            });
+        }
+        if s[0] < s[2] - margin {
+            // Flow at the strength dilates: it leads to the corner from beyond it.
+            let is_beyond = trial.s.iter().sum::<f64>() <= 3.0 * (margin - self.R_t);
+            let is_strength = zone.shear == Shear::Limit || zone.tension;
+            return if is_strength && is_beyond {
+                Verdict::Corner
+            } else {
+                Verdict::None
+            };
+        }
+        if zone.tension && !system.needs_cut_off(end, margin) {
+            return Verdict::Other(Zone {
+                tension: false,
+                ..zone
+            });
+        }
+        let gamma = trial.gamma + system.growth(Lambda)[0];
+        let gamma = match zone.shear {
+            Shear::None => trial.gamma,
+            Shear::Hardening => gamma,
+            Shear::Limit => {
+                let (reached, ..) = self.gamma(s[0] - s[2], s[2]);
+                if may_harden && reached > gamma * (1.0 + MARGIN) {
+                    return Verdict::Other(Zone {
+                        shear: Shear::Hardening,
+                        ..zone
+                    });
+                }
+                reached.max(trial.gamma)
+            }
+        };
+        let [shear, limit, cap, tension] = self.excess(s, end.p_p, gamma);
+        let mut other = zone;
+        if zone.shear != Shear::Limit && limit > margin {
+            other.shear = Shear::Limit;
+        } else if zone.shear == Shear::None && shear > margin {
+            other.shear = Shear::Hardening;
+        }
+        if !zone.cap && cap > margin {
+            other.cap = true;
+            other.cylinder = s.iter().sum::<f64>() <= 0.0;
+        }
+        other.tension |= tension > margin;
+        if other == zone {
+            Verdict::Ends(gamma)
+        } else {
+            Verdict::Other(other)
+        }
+    }
+
+    /// Rates of an end, from the rates of what it depends on.
+    #[inline]
+    pub(crate) fn end_rates(&self, trial: &Trial, end: &End, of: &Rates) -> Rates {
+        match end.iterate {
+            Some(iterate) => {
+                let hardening = self.cap.hardening(self, trial.p_p);
+                System::new(self, trial, end.zone, hardening).rates(&iterate, of)
+            }
+            None if end.zone.corner => Rates { s: [0.0; 3], ..*of },
+            None => *of,
+        }
+    }
+}
+
+impl End {
+    /// What the return leaves of a shear stress between two principal axes, Eq. (20).
+    #[inline]
+    pub(crate) fn kappa(&self, soil: &Soil, trial: &Trial, [i, j]: [usize; 2]) -> f64 {
+        if self.zone.corner {
+            return 0.0;
+        }
+        let gap = trial.s[i] - trial.s[j];
+        if gap > MARGIN * soil.size(&trial.s) {
+            return (self.s[i] - self.s[j]) / gap;
+        }
+        // Of equal stresses those merge that flow would separate.
+        match self.iterate {
+            Some(_) if self.zone.shear != Shear::None || self.zone.cap => {
+                let isotropic = trial.s[0] - trial.s[2] <= MARGIN * soil.size(&trial.s);
+                if isotropic && self.zone.cap {
+                    let mu = self.iterate.map_or(0.0, |end| end.multipliers[1]);
+                    let M = soil.cap.M;
+                    1.0 / (1.0 + 6.0 * mu * trial.theta * soil.G * trial.E / (M * M))
+                } else {
+                    0.0
+                }
+            }
+            _ => 1.0,
+        }
+    }
+}
+
+/// What to make of a solution.
+enum Verdict {
+    /// It is the return, with this γ_ps.
+    Ends(f64),
+    /// Nothing but the corner is left.
+    Corner,
+    /// There is none.
+    None,
+    /// Principal stresses have overtaken each other.
+    Merge(Merged),
+    /// Other surfaces are active.
+    Other(Zone),
+}
+
+/// Newton's method for the multipliers.
+#[inline]
+fn solve(system: &System<'_>, mut multipliers: [f64; 2], size: f64) -> Option<Iterate> {
+    const MAX_ITERATIONS: u32 = 30;
+    let mut before = f64::INFINITY;
+    for _ in 0..MAX_ITERATIONS {
+        let end = system.at(multipliers);
+        let residual = end.residual[0].abs().max(end.residual[1].abs()) / size;
+        if residual <= 1e-15 || (residual <= 1e-12 && residual >= 0.5 * before) {
+            return Some(end);
+        }
+        if !residual.is_finite() {
+            return None;
+        }
+        before = residual;
+        let step = end.correction(&end.residual);
+        multipliers = [multipliers[0] + step[0], multipliers[1] + step[1]];
+    }
+    None
+}

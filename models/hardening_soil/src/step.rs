@@ -1,0 +1,414 @@
+//! A step in two passes, Eqs. (13) to (15), and the increment divided into such steps, with the derivative of
+//! the result.
+//!
+//! Compression is positive here.
+
+use crate::return_mapping::{End, Trial};
+use crate::soil::Soil;
+use crate::spectral::Principal;
+use crate::system::Rates;
+use abi::Failure;
+use std::array;
+
+/// Stress, over p_ref, below which errors are relative to it and not to the stress itself.
+const SMALL_STRESS: f64 = 0.02;
+
+/// How near the cap, over the stress, a step counts as beginning on it.
+const NEARLY: f64 = 1e-4;
+
+/// Halvings of a step.
+const MAX_HALVINGS: u32 = 16;
+
+/// Steps, whole ones and halves, in an increment.
+const MAX_ATTEMPTS: u32 = 2000;
+
+/// Stress and internal variables on their way through an increment.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Point<const N: usize> {
+    pub(crate) stress: [f64; N],
+    pub(crate) p_p: f64,
+    pub(crate) gamma: f64,
+}
+
+/// Derivatives of a point by the strain increment, a column for each component.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Derivative<const N: usize> {
+    columns: [Point<N>; N],
+}
+
+impl<const N: usize> Derivative<N> {
+    const ZERO: Self = Self {
+        columns: [Point {
+            stress: [0.0; N],
+            p_p: 0.0,
+            gamma: 0.0,
+        }; N],
+    };
+
+    /// ∂stress/∂strain, row by row.
+    pub(crate) fn tangent(&self) -> [[f64; N]; N] {
+        array::from_fn(|i| array::from_fn(|j| self.columns[j].stress[i]))
+    }
+}
+
+impl<const N: usize> Point<N> {
+    /// # Errors
+    /// The stress is not finite.
+    #[inline]
+    pub(crate) fn check(&self) -> Result<(), Failure> {
+        if self.stress.iter().sum::<f64>().is_finite() {
+            Ok(())
+        } else {
+            Err(Failure::Numeric("the stress overflows"))
+        }
+    }
+
+    /// This point and `other`, by their weights.
+    #[inline]
+    fn sum(&self, own: f64, factor: f64, other: &Self) -> Self {
+        Self {
+            stress: array::from_fn(|i| own * self.stress[i] + factor * other.stress[i]),
+            p_p: own * self.p_p + factor * other.p_p,
+            gamma: own * self.gamma + factor * other.gamma,
+        }
+    }
+}
+
+/// A strain increment, and by what factor small strains stiffen the soil in it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Increment<const N: usize> {
+    pub(crate) strain: [f64; N],
+    /// Young's modulus over that of unloading, and its derivative by the strain.
+    pub(crate) stiffening: f64,
+    pub(crate) stiffening_slope: [f64; N],
+    /// What γ_ps grows by over the plastic shear strain, and its derivative.
+    pub(crate) slowing: f64,
+    pub(crate) slowing_slope: [f64; N],
+}
+
+impl<const N: usize> Increment<N> {
+    /// An increment without effects of small strains.
+    #[inline]
+    pub(crate) fn of(strain: [f64; N]) -> Self {
+        Self {
+            strain,
+            stiffening: 1.0,
+            stiffening_slope: [0.0; N],
+            slowing: 1.0,
+            slowing_slope: [0.0; N],
+        }
+    }
+}
+
+/// A part of an increment.
+#[derive(Clone, Copy)]
+struct Part<'a, const N: usize> {
+    increment: &'a Increment<N>,
+    fraction: f64,
+    /// Whether the increment begins with it.
+    is_first: bool,
+    with_derivative: bool,
+}
+
+/// Both passes of a step.
+struct Step<const N: usize> {
+    start: Principal<N>,
+    /// sin φ_m where shear flow begins, with its derivatives by γ_ps and by the minor stress.
+    mobilised: [f64; 3],
+    /// Minor stress at mid-step.
+    middle: f64,
+    passes: [(Principal<N>, Trial, End); 2],
+    strain: [f64; N],
+    end: Point<N>,
+    /// Size that the error is relative to, kPa.
+    size: f64,
+    error: f64,
+}
+
+impl Soil {
+    /// Stress of an elastic strain over Young's modulus, Eq. (2).
+    #[inline]
+    pub(crate) fn unit_stress<const N: usize>(&self, strain: &[f64; N]) -> [f64; N] {
+        let volume = self.lambda * (strain[0] + strain[1] + strain[2]);
+        array::from_fn(|i| {
+            if i < 3 {
+                volume + 2.0 * self.G * strain[i]
+            } else {
+                self.G * strain[i]
+            }
+        })
+    }
+
+    /// Elastic operator at a stress, Eq. (2), row by row.
+    pub(crate) fn operator<const N: usize>(
+        &self,
+        stress: &[f64; N],
+        stiffening: f64,
+    ) -> [[f64; N]; N] {
+        let E = stiffening * self.stiffness(Principal::of(stress).values[2]).0;
+        array::from_fn(|i| {
+            let mut strain = [0.0; N];
+            strain[i] = E;
+            self.unit_stress(&strain)
+        })
+    }
+
+    /// One step: Eqs. (13) to (15). None if a return fails.
+    #[inline]
+    fn step<const N: usize>(&self, from: &Point<N>, part: &Part<'_, N>) -> Option<Step<N>> {
+        let strain = part.increment.strain.map(|e| part.fraction * e);
+        let unit = self.unit_stress(&strain);
+        let start = Principal::of(&from.stress);
+        let s_0 = start.values;
+        let begin = self.hyperbola(from.gamma, s_0[2]);
+        let [x_0, by_q, by_minor] = self.mobilised(begin.q, s_0[2]);
+        let mobilised = [x_0, by_q * begin.by_gamma, by_q * begin.by_minor + by_minor];
+        let pass = |E: f64, sin_psi: f64, theta: f64, guess: Option<&End>| {
+            let trial: [f64; N] = array::from_fn(|i| from.stress[i] + E * unit[i]);
+            let principal = Principal::of(&trial);
+            let mut trial = Trial {
+                s: principal.values,
+                start: s_0,
+                E,
+                sin_psi,
+                sin_psi_limit: self.sin_psi,
+                p_p: from.p_p,
+                gamma: from.gamma,
+                slowing: part.increment.slowing,
+                theta,
+            };
+            let end = match self.return_stress(&trial, guess) {
+                Some(end) => end,
+                None => {
+                    trial.theta = 1.0;
+                    self.return_stress(&trial, None)?
+                }
+            };
+            Some((principal, trial, end))
+        };
+        let stiffness = |minor| part.increment.stiffening * self.stiffness(minor).0;
+        let first = pass(stiffness(s_0[2]), self.dilatancy(x_0, x_0)[0], 1.0, None)?;
+        let s_1 = first.2.s;
+        let middle = 0.5 * (s_0[2] + s_1[2]);
+        let [x_1, ..] = self.mobilised(s_1[0] - s_1[2], s_1[2]);
+        let [.., cap, _] = self.excess(&s_0, from.p_p, from.gamma);
+        let is_on_cap = cap > -NEARLY * self.size(&s_0);
+        let theta = if is_on_cap { 0.5 } else { 1.0 };
+        let [u, ..] = self.dilatancy(x_0, x_1);
+        let second = pass(stiffness(middle), u, theta, Some(&first.2))?;
+        let s_2 = second.2.s;
+        let off = (0..3).map(|i| (s_2[i] - s_1[i]).abs()).fold(0.0, f64::max);
+        let size = self.size(&s_0).max(SMALL_STRESS * self.p_ref);
+        Some(Step {
+            start,
+            mobilised,
+            middle,
+            strain,
+            end: Point {
+                stress: second.0.compose(&s_2),
+                p_p: second.2.p_p,
+                gamma: second.2.gamma,
+            },
+            passes: [first, second],
+            size,
+            error: off / size,
+        })
+    }
+
+    /// The derivative of a step's end, and of its error, from the derivative of its start.
+    #[inline]
+    fn differentiate<const N: usize>(
+        &self,
+        step: &Step<N>,
+        from: &Derivative<N>,
+        part: &Part<'_, N>,
+    ) -> (Derivative<N>, [f64; N]) {
+        let [(axes_1, trial_1, end_1), (axes_2, trial_2, end_2)] = &step.passes;
+        let Increment {
+            stiffening,
+            stiffening_slope,
+            ..
+        } = part.increment;
+        let unit = self.unit_stress(&step.strain);
+        let s_0 = step.start.values;
+        let (E_0, E_0_slope) = self.stiffness(s_0[2]);
+        let (E, E_slope) = self.stiffness(step.middle);
+        let [x_0, x_0_by_gamma, x_0_by_minor] = step.mobilised;
+        let s_1 = end_1.s;
+        let [x_1, x_1_by_q, x_1_by_minor] = self.mobilised(s_1[0] - s_1[2], s_1[2]);
+        let at_0 = self.dilatancy(x_0, x_0);
+        let over = self.dilatancy(x_0, x_1);
+        let worst = (0..3).fold(0, |worst, i| {
+            let off = |i: usize| (end_2.s[i] - s_1[i]).abs();
+            if off(i) > off(worst) { i } else { worst }
+        });
+        let sign = (end_2.s[worst] - s_1[worst]).signum();
+        let by_size = if self.size(&s_0) > SMALL_STRESS * self.p_ref {
+            step.error
+        } else {
+            0.0
+        };
+        let (start, turn_1, turn_2) = (step.start.turn(), axes_1.turn(), axes_2.turn());
+        let mut error = [0.0; N];
+        let columns = array::from_fn(|j| {
+            let column = &from.columns[j];
+            let d_s_0 = if part.is_first {
+                [0.0; 3]
+            } else {
+                start.normal(&column.stress)
+            };
+            let d_x_0 = x_0_by_gamma * column.gamma + x_0_by_minor * d_s_0[2];
+            let mut of = Rates {
+                start: d_s_0,
+                p_p: column.p_p,
+                gamma: column.gamma,
+                slowing: part.increment.slowing_slope[j],
+                ..Rates::default()
+            };
+            let mut strain = [0.0; N];
+            strain[j] = part.fraction;
+            let d_unit = self.unit_stress(&strain);
+            let trial = |E: f64, d_E: f64| -> [f64; N] {
+                array::from_fn(|i| column.stress[i] + E * d_unit[i] + d_E * unit[i])
+            };
+            of.E = stiffening * E_0_slope * d_s_0[2] + stiffening_slope[j] * E_0;
+            of.s = turn_1.normal(&trial(trial_1.E, of.E));
+            of.sin_psi = (at_0[1] + at_0[2]) * d_x_0;
+            let d_s_1 = self.end_rates(trial_1, end_1, &of).s;
+            let d_middle = 0.5 * (d_s_0[2] + d_s_1[2]);
+            of.E = stiffening * E_slope * d_middle + stiffening_slope[j] * E;
+            let moved = turn_2.stress(&trial(trial_2.E, of.E));
+            of.s = [moved[0], moved[1], moved[2]];
+            let d_x_1 = x_1_by_q * (d_s_1[0] - d_s_1[2]) + x_1_by_minor * d_s_1[2];
+            of.sin_psi = over[1] * d_x_0 + over[2] * d_x_1;
+            let end = self.end_rates(trial_2, end_2, &of);
+            let d_size = by_size * self.size_rate(&s_0, &d_s_0);
+            error[j] = (sign * (end.s[worst] - d_s_1[worst]) - d_size) / step.size;
+            let kept: [f64; N] = array::from_fn(|i| {
+                if i < 3 {
+                    end.s[i]
+                } else {
+                    end_2.kappa(self, trial_2, axes_2.pair(i)) * moved[i]
+                }
+            });
+            Point {
+                stress: turn_2.back(&kept),
+                p_p: end.p_p,
+                gamma: end.gamma,
+            }
+        });
+        (Derivative { columns }, error)
+    }
+
+    /// Carries a point over an increment.
+    ///
+    /// # Errors
+    /// The steps become too many or too small.
+    #[inline]
+    pub(crate) fn carry<const N: usize>(
+        &self,
+        start: Point<N>,
+        increment: &Increment<N>,
+        with_derivative: bool,
+    ) -> Result<(Point<N>, Derivative<N>), Failure> {
+        let mut at = (start, Derivative::ZERO);
+        let mut part = Part {
+            increment,
+            fraction: 1.0 / f64::from(self.substeps),
+            is_first: true,
+            with_derivative,
+        };
+        let mut attempts = MAX_ATTEMPTS;
+        for done in 0..self.substeps {
+            at = self
+                .advance(&at, &part, MAX_HALVINGS, &mut attempts)
+                .ok_or(Failure::CutStep {
+                    factor: (f64::from(done) + 0.25) * part.fraction,
+                    reason: "the steps that the tolerance asks for are too many or too small",
+                })?;
+            part.is_first = false;
+        }
+        Ok(at)
+    }
+
+    /// A part of the increment in one step, in two halves, or a mean of both in proportion to the error, so that
+    /// the result is continuous. None if the steps become too many or too small.
+    fn advance<const N: usize>(
+        &self,
+        from: &(Point<N>, Derivative<N>),
+        part: &Part<'_, N>,
+        halvings: u32,
+        attempts: &mut u32,
+    ) -> Option<(Point<N>, Derivative<N>)> {
+        *attempts = attempts.checked_sub(1)?;
+        let whole = self.step(&from.0, part);
+        // How far the error is from half the tolerance to all of it.
+        let excess = |s: &Step<N>| (2.0 * s.error / self.tolerance - 1.0).clamp(0.0, 1.0);
+        let whole = whole.filter(|step| excess(step) < 1.0);
+        let weighed = whole.map(|step| {
+            let (derivative, error) = if part.with_derivative {
+                self.differentiate(&step, &from.1, part)
+            } else {
+                (Derivative::ZERO, [0.0; N])
+            };
+            (step.end, derivative, excess(&step), error)
+        });
+        if let Some((end, derivative, weight, _)) = weighed
+            && weight <= 0.0
+        {
+            return Some((end, derivative));
+        }
+        let halvings = halvings.checked_sub(1)?;
+        let mut half = Part {
+            fraction: 0.5 * part.fraction,
+            ..*part
+        };
+        let middle = self.advance(from, &half, halvings, attempts)?;
+        half.is_first = false;
+        let halves = self.advance(&middle, &half, halvings, attempts)?;
+        let Some((end, derivative, excess, error)) = weighed else {
+            return Some(halves);
+        };
+        // Smooth at both ends.
+        let weight = excess * excess * (3.0 - 2.0 * excess);
+        let slope = 6.0 * excess * (1.0 - excess) * 2.0 / self.tolerance;
+        let mut mean = (end.sum(1.0 - weight, weight, &halves.0), Derivative::ZERO);
+        if part.with_derivative {
+            let change = halves.0.sum(1.0, -1.0, &end);
+            mean.1.columns = array::from_fn(|j| {
+                derivative.columns[j]
+                    .sum(1.0 - weight, weight, &halves.1.columns[j])
+                    .sum(1.0, slope * error[j], &change)
+            });
+        }
+        self.harden(&mut mean.0, &mut mean.1);
+        Some(mean)
+    }
+
+    /// Brings the surfaces to a mean of stresses, which may lie beyond those of the mean variables.
+    #[cold]
+    fn harden<const N: usize>(&self, point: &mut Point<N>, derivative: &mut Derivative<N>) {
+        let principal = Principal::of(&point.stress);
+        let s = principal.values;
+        let turn = principal.turn();
+        let [shear, _, cap, _] = self.excess(&s, point.p_p, point.gamma);
+        if shear > 0.0 {
+            let (gamma, by_q, by_minor) = self.gamma(s[0] - s[2], s[2]);
+            point.gamma = gamma;
+            for column in &mut derivative.columns {
+                let rate = turn.normal(&column.stress);
+                column.gamma = by_q * (rate[0] - rate[2]) + by_minor * rate[2];
+            }
+        }
+        if cap > 0.0 {
+            let (q, p) = (self.cap.q(&s), ((s[0] + s[1] + s[2]) / 3.0).max(0.0));
+            point.p_p = self.cap.size(q, p);
+            let by_q = q / (self.cap.M * self.cap.M * point.p_p);
+            for column in &mut derivative.columns {
+                let rate = turn.normal(&column.stress);
+                let mean = (rate[0] + rate[1] + rate[2]) / 3.0;
+                column.p_p = by_q * self.cap.q(&rate) + p / point.p_p * mean;
+            }
+        }
+    }
+}

@@ -1,0 +1,433 @@
+//! The equations of a return with known active surfaces, Eq. (17): principal stresses as functions of the
+//! two multipliers, the conditions that these satisfy, and the derivatives of the result.
+//!
+//! Compression is positive here; Λ is the multiplier of shear, μ that of the cap.
+
+use crate::cap::Hardening;
+use crate::return_mapping::{Merged, Shear, Trial, Zone};
+use crate::soil::Soil;
+
+/// Σ xᵢ yᵢ.
+#[inline]
+pub(crate) fn dot(x: &[f64; 3], y: &[f64; 3]) -> f64 {
+    x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
+}
+
+/// x + factor y.
+#[inline]
+fn plus(x: &[f64; 3], factor: f64, y: &[f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| x[i] + factor * y[i])
+}
+
+#[inline]
+fn mean(x: &[f64; 3]) -> f64 {
+    (x[0] + x[1] + x[2]) / 3.0
+}
+
+/// Stress, multipliers and the derivatives of the conditions at one iterate.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Iterate {
+    pub(crate) s: [f64; 3],
+    /// Λ and μ.
+    pub(crate) multipliers: [f64; 2],
+    /// The two conditions, kPa; 0 for a surface that is not active.
+    pub(crate) residual: [f64; 2],
+    /// p and q̃ that the cap's flow follows.
+    pub(crate) middle: [f64; 2],
+    /// ∂s/∂Λ and ∂s/∂μ.
+    by_multiplier: [[f64; 3]; 2],
+    /// Derivatives of the conditions by s, and by Λ and μ in all.
+    gradient: [[f64; 3]; 2],
+    jacobian: [[f64; 2]; 2],
+    /// Derivative of the first condition by γ_ps.
+    by_gamma: f64,
+    /// p_p and its derivatives by the cap's volume strain and by p_p at the start.
+    pub(crate) p_p: f64,
+    by_strain: f64,
+    by_start: f64,
+}
+
+/// Rates of what a return depends on, and of its results.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Rates {
+    /// Principal stresses: of the trial stress, then of the end.
+    pub(crate) s: [f64; 3],
+    /// Principal stresses at the start.
+    pub(crate) start: [f64; 3],
+    /// Young's modulus, kPa.
+    pub(crate) E: f64,
+    /// sin ψ_m.
+    pub(crate) sin_psi: f64,
+    pub(crate) p_p: f64,
+    pub(crate) gamma: f64,
+    pub(crate) slowing: f64,
+}
+
+/// A return to known surfaces.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct System<'a> {
+    soil: &'a Soil,
+    pub(crate) trial: &'a Trial,
+    pub(crate) zone: Zone,
+    /// Gradient of q̃.
+    a: [f64; 3],
+    /// Trial stress after merging and cut-off.
+    s: [f64; 3],
+    /// What stress a unit of Λ takes away, and a unit of μ for each unit of p and q̃.
+    by_shear: [f64; 3],
+    by_p: [f64; 3],
+    by_q: [f64; 3],
+    /// p and q̃ at the start.
+    start: [f64; 2],
+    hardening: Hardening,
+}
+
+const THIRD: [f64; 3] = [1.0 / 3.0; 3];
+
+impl<'a> System<'a> {
+    #[inline]
+    pub(crate) fn new(soil: &'a Soil, trial: &'a Trial, zone: Zone, hardening: Hardening) -> Self {
+        let a = soil.cap.gradient(
+            zone.merged == Merged::First12,
+            zone.merged == Merged::Last23,
+        );
+        let mut system = Self {
+            soil,
+            trial,
+            zone,
+            a,
+            s: trial.s,
+            by_shear: [0.0; 3],
+            by_p: [0.0; 3],
+            by_q: [0.0; 3],
+            start: [mean(&trial.start), soil.cap.q(&trial.start)],
+            hardening,
+        };
+        system.s = system.condensed(&trial.s, soil.R_t);
+        let M = soil.cap.M;
+        system.by_shear = system.elastic(&system.flow(system.sin_psi()));
+        if !zone.cylinder {
+            system.by_p = system.elastic(&[2.0 / 3.0; 3]);
+        }
+        system.by_q = system.elastic(&a.map(|a| 2.0 / (M * M) * a));
+        system
+    }
+
+    /// sin ψ_m of the flow: at the strength that of ψ.
+    #[inline]
+    fn sin_psi(&self) -> f64 {
+        if self.zone.shear == Shear::Limit {
+            self.trial.sin_psi_limit
+        } else {
+            self.trial.sin_psi
+        }
+    }
+
+    /// Direction of shear flow, Eq. (5); on an edge the mean of its sides.
+    #[inline]
+    fn flow(&self, u: f64) -> [f64; 3] {
+        let (major, minor) = (0.5 * (1.0 - u), -0.5 * (1.0 + u));
+        match self.zone.merged {
+            Merged::None => [major, 0.0, minor],
+            Merged::First12 => [0.5 * major, 0.5 * major, minor],
+            Merged::Last23 => [major, 0.5 * minor, 0.5 * minor],
+        }
+    }
+
+    /// What γ_ps grows by, Eq. (5), and its derivatives by Λ, sin ψ_m, and the difference of plastic strains that
+    /// an edge of equal major stresses closes.
+    #[inline]
+    pub(crate) fn growth(&self, Lambda: f64) -> [f64; 4] {
+        let h = self.trial.slowing;
+        let u = self.sin_psi();
+        if self.zone.merged == Merged::First12 {
+            let apart = self.apart(self.trial.s[0] - self.trial.s[1]);
+            if apart < 0.5 * Lambda * (1.0 - u) {
+                let share = 0.5 * h * (1.0 + u);
+                return [share * Lambda + h * apart, share, 0.5 * h * Lambda, h];
+            }
+        }
+        [h * Lambda, h, 0.0, 0.0]
+    }
+
+    /// Difference of plastic strains that makes stresses equal.
+    #[inline]
+    fn apart(&self, difference: f64) -> f64 {
+        difference / (2.0 * self.soil.G * self.trial.E)
+    }
+
+    /// The mean of merged stresses, and what the cut-off makes of them, Eq. (16).
+    #[inline]
+    fn condensed(&self, s: &[f64; 3], R_t: f64) -> [f64; 3] {
+        let nu = self.soil.nu;
+        let [mut s1, mut s2, mut s3] = *s;
+        match self.zone.merged {
+            Merged::None => {}
+            Merged::First12 => {
+                s1 = 0.5 * (s1 + s2);
+                s2 = s1;
+            }
+            Merged::Last23 => {
+                s2 = 0.5 * (s2 + s3);
+                s3 = s2;
+            }
+        }
+        if !self.zone.tension {
+            return [s1, s2, s3];
+        }
+        if self.zone.merged == Merged::Last23 {
+            return [s1 - 2.0 * nu * (s3 + R_t), -R_t, -R_t];
+        }
+        let change = nu / (1.0 - nu) * (s3 + R_t);
+        [s1 - change, s2 - change, -R_t]
+    }
+
+    /// Stress of a strain; at the cut-off the stress that it does not take away, Eq. (16).
+    #[inline]
+    fn elastic(&self, strain: &[f64; 3]) -> [f64; 3] {
+        let Soil { lambda, G, .. } = *self.soil;
+        let E = self.trial.E;
+        if !self.zone.tension {
+            let volume = lambda * E * (strain[0] + strain[1] + strain[2]);
+            return strain.map(|e| volume + 2.0 * G * E * e);
+        }
+        if self.zone.merged == Merged::Last23 {
+            return [E * strain[0], 0.0, 0.0];
+        }
+        let plane = 2.0 * G * lambda / (lambda + 2.0 * G) * E * (strain[0] + strain[1]);
+        [
+            plane + 2.0 * G * E * strain[0],
+            plane + 2.0 * G * E * strain[1],
+            0.0,
+        ]
+    }
+
+    /// The change of stress that follows a direct change, since the cap's flow depends on the stress.
+    #[inline]
+    fn respond(&self, direct: &[f64; 3], mu: f64) -> [f64; 3] {
+        let w = mu * self.trial.theta;
+        if w == 0.0 {
+            return *direct;
+        }
+        let (pp, pq) = (1.0 + w * mean(&self.by_p), w * mean(&self.by_q));
+        let (qp, qq) = (
+            w * dot(&self.a, &self.by_p),
+            1.0 + w * dot(&self.a, &self.by_q),
+        );
+        let (p, q) = (mean(direct), dot(&self.a, direct));
+        let scale = 1.0 / (pp * qq - pq * qp);
+        let (p, q) = ((qq * p - pq * q) * scale, (pp * q - qp * p) * scale);
+        plus(&plus(direct, -w * p, &self.by_p), -w * q, &self.by_q)
+    }
+
+    /// Stress, conditions and their derivatives.
+    #[inline]
+    pub(crate) fn at(&self, multipliers: [f64; 2]) -> Iterate {
+        let [Lambda, mu] = multipliers;
+        let (soil, theta) = (self.soil, self.trial.theta);
+        let [p_0, q_0] = self.start;
+        let mut s = plus(&self.s, -Lambda, &self.by_shear);
+        let mut middle = [0.0; 2];
+        if self.zone.cap {
+            let old = mu * (1.0 - theta);
+            s = plus(&plus(&s, -old * p_0, &self.by_p), -old * q_0, &self.by_q);
+            s = self.respond(&s, mu);
+            middle = [
+                (1.0 - theta) * p_0 + theta * mean(&s),
+                (1.0 - theta) * q_0 + theta * dot(&self.a, &s),
+            ];
+        }
+        let flow = plus(&self.by_p.map(|x| -middle[0] * x), -middle[1], &self.by_q);
+        let mut end = Iterate {
+            s,
+            multipliers,
+            residual: [0.0; 2],
+            middle,
+            by_multiplier: [
+                self.respond(&self.by_shear.map(|x| -x), mu),
+                self.respond(&flow, mu),
+            ],
+            gradient: [[0.0; 3]; 2],
+            jacobian: [[1.0, 0.0], [0.0, 1.0]],
+            by_gamma: 0.0,
+            p_p: self.trial.p_p,
+            by_strain: 0.0,
+            by_start: 1.0,
+        };
+        if self.zone.shear != Shear::None {
+            let [growth, weight, ..] = self.growth(Lambda);
+            let (q, by_minor);
+            if self.zone.shear == Shear::Hardening {
+                let on = soil.hyperbola(self.trial.gamma + growth, s[2]);
+                (q, by_minor) = (on.q, on.by_minor);
+                end.by_gamma = -on.by_gamma;
+            } else {
+                (q, by_minor) = soil.q_f(s[2]);
+            }
+            end.residual[0] = s[0] - s[2] - q;
+            end.gradient[0] = [1.0, 0.0, -1.0 - by_minor];
+            end.jacobian[0] = [
+                dot(&end.gradient[0], &end.by_multiplier[0]) + end.by_gamma * weight,
+                if self.zone.cap {
+                    dot(&end.gradient[0], &end.by_multiplier[1])
+                } else {
+                    0.0
+                },
+            ];
+        }
+        if self.zone.cap {
+            let M = soil.cap.M;
+            let (p, q) = (mean(&s), dot(&self.a, &s));
+            let size = soil.cap.size(q, p);
+            let pressure = if self.zone.cylinder { 0.0 } else { middle[0] };
+            let mut hardened = self.hardening.after(2.0 * mu * pressure);
+            if self.zone.cylinder {
+                hardened.by_strain = 0.0;
+            }
+            (end.p_p, end.by_strain, end.by_start) =
+                (hardened.p_p, hardened.by_strain, hardened.by_start);
+            end.residual[1] = size - hardened.p_p;
+            let by_p = p.max(0.0) / size - hardened.by_strain * 2.0 * mu * theta;
+            let by_q = q / (M * M * size);
+            end.gradient[1] = plus(&THIRD.map(|x| x * by_p), by_q, &self.a);
+            end.jacobian[1] = [
+                if self.zone.shear == Shear::None {
+                    0.0
+                } else {
+                    dot(&end.gradient[1], &end.by_multiplier[0])
+                },
+                dot(&end.gradient[1], &end.by_multiplier[1]) - hardened.by_strain * 2.0 * middle[0],
+            ];
+        }
+        end
+    }
+
+    /// Whether the cut-off has to hold the stress back at this end.
+    #[inline]
+    pub(crate) fn needs_cut_off(&self, end: &Iterate, margin: f64) -> bool {
+        let Soil { lambda, G, cap, .. } = self.soil;
+        let [Lambda, mu] = end.multipliers;
+        let shear = self.flow(self.sin_psi());
+        let [p, q] = end.middle;
+        let p = if self.zone.cylinder { 0.0 } else { p };
+        let flow: [f64; 3] = std::array::from_fn(|i| {
+            Lambda * shear[i] + mu * (2.0 / 3.0 * p + 2.0 * q / (cap.M * cap.M) * self.a[i])
+        });
+        let trial = match self.zone.merged {
+            Merged::Last23 => 0.5 * (self.trial.s[1] + self.trial.s[2]),
+            _ => self.trial.s[2],
+        };
+        let E = self.trial.E;
+        let free = trial - E * (lambda * (flow[0] + flow[1] + flow[2]) + 2.0 * G * flow[2]);
+        free <= margin - self.soil.R_t
+    }
+
+    /// Whether flow on one side of the edge would carry the merged stresses past each other.
+    #[inline]
+    pub(crate) fn merges(&self, end: &Iterate) -> bool {
+        let [Lambda, mu] = end.multipliers;
+        let t = &self.trial.s;
+        let u = self.sin_psi();
+        let side = self.soil.cap.gradient(false, false);
+        let M = self.soil.cap.M;
+        let cap = mu * 2.0 * end.middle[1] / (M * M);
+        let (gap, closing) = match self.zone.merged {
+            Merged::None => return true,
+            Merged::First12 => (
+                t[0] - t[1],
+                0.5 * Lambda * (1.0 - u) + cap * (side[0] - side[1]),
+            ),
+            Merged::Last23 => (
+                t[1] - t[2],
+                0.5 * Lambda * (1.0 + u) + cap * (side[1] - side[2]),
+            ),
+        };
+        gap <= 2.0 * self.soil.G * self.trial.E * closing
+    }
+
+    /// Rates of stress, p_p and γ_ps at the end; E, sin ψ_m and `start` of the result are unused.
+    #[inline]
+    pub(crate) fn rates(&self, end: &Iterate, of: &Rates) -> Rates {
+        let [Lambda, mu] = end.multipliers;
+        let theta = self.trial.theta;
+        let old = 1.0 - theta;
+        let mut direct = self.condensed(&of.s, 0.0);
+        let by_E = of.E / self.trial.E;
+        direct = plus(&direct, -Lambda * by_E, &self.by_shear);
+        let u = if self.zone.shear == Shear::Hardening {
+            of.sin_psi
+        } else {
+            0.0
+        };
+        if u != 0.0 {
+            let zero = self.flow(0.0);
+            let turn: [f64; 3] = std::array::from_fn(|i| self.flow(1.0)[i] - zero[i]);
+            direct = plus(&direct, -Lambda * u, &self.elastic(&turn));
+        }
+        let (p_0, q_0) = (mean(&of.start), self.soil.cap.q(&of.start));
+        if self.zone.cap {
+            direct = plus(
+                &direct,
+                -mu * (by_E * end.middle[0] + old * p_0),
+                &self.by_p,
+            );
+            direct = plus(
+                &direct,
+                -mu * (by_E * end.middle[1] + old * q_0),
+                &self.by_q,
+            );
+        }
+        let fixed = self.respond(&direct, mu);
+        let [growth, weight, by_u, by_apart] = self.growth(Lambda);
+        let difference = self.trial.s[0] - self.trial.s[1];
+        let apart = self.apart(of.s[0] - of.s[1] - by_E * difference);
+        let gamma =
+            of.gamma + by_u * u + by_apart * apart + growth / self.trial.slowing * of.slowing;
+        let mut change = [0.0; 2];
+        if self.zone.shear != Shear::None {
+            change[0] = dot(&end.gradient[0], &fixed) + end.by_gamma * gamma;
+        }
+        if self.zone.cap {
+            change[1] = dot(&end.gradient[1], &fixed)
+                - end.by_start * of.p_p
+                - end.by_strain * 2.0 * mu * old * p_0;
+        }
+        let [d_Lambda, d_mu] = end.correction(&change);
+        let s = plus(
+            &plus(&fixed, d_Lambda, &end.by_multiplier[0]),
+            d_mu,
+            &end.by_multiplier[1],
+        );
+        let mut rates = Rates {
+            s,
+            p_p: of.p_p,
+            gamma: of.gamma,
+            ..Rates::default()
+        };
+        if self.zone.cap {
+            let volume = d_mu * end.middle[0] + mu * (theta * mean(&s) + old * p_0);
+            rates.p_p = end.by_start * of.p_p + end.by_strain * 2.0 * volume;
+        }
+        match self.zone.shear {
+            Shear::None => {}
+            Shear::Hardening => rates.gamma = gamma + weight * d_Lambda,
+            Shear::Limit => {
+                let (reached, by_q, by_minor) = self.soil.gamma(end.s[0] - end.s[2], end.s[2]);
+                if reached > self.trial.gamma {
+                    rates.gamma = by_q * (s[0] - s[2]) + by_minor * s[2];
+                }
+            }
+        }
+        rates
+    }
+}
+
+impl Iterate {
+    /// −J⁻¹ x.
+    #[inline]
+    pub(crate) fn correction(&self, x: &[f64; 2]) -> [f64; 2] {
+        let [[a, b], [c, d]] = self.jacobian;
+        let scale = -1.0 / (a * d - b * c);
+        [(d * x[0] - b * x[1]) * scale, (a * x[1] - c * x[0]) * scale]
+    }
+}
