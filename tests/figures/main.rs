@@ -117,6 +117,7 @@ const COMMITTED: &[Committed] = &[
         &["shares", "contact_pressure"],
     ),
     ("pushed_pulled_pile/case.toml", "", "*", &["loads"]),
+    ("energy_pile/case.toml", "", "*", &["axial_force"]),
     (
         "aspect_ratio/case.toml",
         "",
