@@ -276,10 +276,7 @@ fn draw(input: &str) -> TempDir {
         runs::calibration::run(&path, &options, &mut |_| (), &mut |_| ()).unwrap();
         return place;
     }
-    if ["shear_box/", "shear_zone/", "joint_laws/"]
-        .iter()
-        .any(|point| input.starts_with(point))
-    {
+    if input::is_driver(&path).unwrap() {
         run_file_variants(&path, None, Some(&place.path().join("rows.csv")), |_| ()).unwrap();
         return place;
     }
