@@ -342,21 +342,30 @@ impl Soil {
         }
     }
 
-    /// Rates of an end, from the rates of what it depends on.
+    /// The equations that an end satisfies, if it is neither elastic nor the corner.
     #[inline]
-    pub(crate) fn end_rates(&self, trial: &Trial, end: &End, of: &Rates) -> Rates {
-        match end.iterate {
-            Some(iterate) => {
-                let hardening = self.cap.hardening(self, trial.p_p);
-                System::new(self, trial, end.zone, hardening).rates(&iterate, of)
-            }
-            None if end.zone.corner => Rates { s: [0.0; 3], ..*of },
-            None => *of,
-        }
+    pub(crate) fn system<'a>(
+        &'a self,
+        trial: &'a Trial,
+        end: &End,
+    ) -> Option<(System<'a>, Iterate)> {
+        let hardening = self.cap.hardening(self, trial.p_p);
+        let iterate = end.iterate?;
+        Some((System::new(self, trial, end.zone, hardening), iterate))
     }
 }
 
 impl End {
+    /// Rates of an end, from the rates of what it depends on.
+    #[inline]
+    pub(crate) fn rates(&self, system: Option<&(System<'_>, Iterate)>, of: &Rates) -> Rates {
+        match system {
+            Some((system, iterate)) => system.rates(iterate, of),
+            None if self.zone.corner => Rates { s: [0.0; 3], ..*of },
+            None => *of,
+        }
+    }
+
     /// What the return leaves of a shear stress between two principal axes, Eq. (20).
     #[inline]
     pub(crate) fn kappa(&self, soil: &Soil, trial: &Trial, [i, j]: [usize; 2]) -> f64 {
