@@ -231,10 +231,13 @@ impl Soil {
                     for (x, is_active) in multipliers.iter_mut().zip(is_active) {
                         *x = if is_active { *x } else { 0.0 };
                     }
-                    zone = Zone {
-                        merged: base,
-                        ..other
-                    };
+                    // Less flow may not close the gap any more; more flow does.
+                    let is_less = (zone.cap && !other.cap)
+                        || (zone.shear != Shear::None && other.shear == Shear::None);
+                    zone = other;
+                    if is_less {
+                        zone.merged = base;
+                    }
                     if zone.shear == Shear::None && !zone.cap {
                         zone.merged = Merged::None;
                     }

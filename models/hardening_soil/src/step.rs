@@ -17,10 +17,10 @@ const SMALL_STRESS: f64 = 0.02;
 const NEARLY: f64 = 1e-4;
 
 /// Halvings of a step.
-const MAX_HALVINGS: u32 = 16;
+const MAX_HALVINGS: u32 = 10;
 
 /// Steps, whole ones and halves, in an increment.
-const MAX_ATTEMPTS: u32 = 2000;
+const MAX_ATTEMPTS: u32 = 400;
 
 /// Stress and internal variables on their way through an increment.
 #[derive(Clone, Copy, Debug)]
