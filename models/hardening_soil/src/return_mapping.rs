@@ -417,12 +417,13 @@ fn solve(system: &System<'_>, mut multipliers: [f64; 2], size: f64) -> Option<It
     let mut before = f64::INFINITY;
     for _ in 0..MAX_ITERATIONS {
         let end = system.at(multipliers);
-        let residual = end.residual[0].abs().max(end.residual[1].abs()) / size;
+        // A sum: the larger of two numbers would hide one that is none.
+        let residual = (end.residual[0].abs() + end.residual[1].abs()) / size;
+        if !(end.s[0] + end.s[1] + end.s[2] + residual).is_finite() {
+            return None;
+        }
         if residual <= 1e-15 || (residual <= 1e-12 && residual >= 0.5 * before) {
             return Some(end);
-        }
-        if !residual.is_finite() {
-            return None;
         }
         before = residual;
         let step = end.correction(&end.residual);
