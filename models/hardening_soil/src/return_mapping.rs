@@ -27,6 +27,7 @@ pub(crate) enum Merged {
 
 /// The active surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(clippy::struct_excessive_bools, reason = "surfaces are active or not")]
 pub(crate) struct Zone {
     pub(crate) merged: Merged,
     pub(crate) shear: Shear,
@@ -139,16 +140,13 @@ impl Soil {
         ]
     }
 
-    /// Returns a trial stress, Eq. (15). None if the iterations fail: then a smaller step may not.
-    /// `guess` are zone and multipliers of a return from nearby.
+    /// The surfaces that a trial stress lies beyond.
     #[inline]
-    pub(crate) fn return_stress(&self, trial: &Trial, guess: Option<&End>) -> Option<End> {
-        let size = self.size(&trial.s);
-        let margin = MARGIN * size;
+    fn violated(&self, trial: &Trial, margin: f64) -> Zone {
         let [shear, limit, cap, tension] = self.excess(&trial.s, trial.p_p, trial.gamma);
         // Beyond the strength, flow along it leaves less to the cap, or nothing.
         let cap = if limit > margin { 0.0 } else { cap };
-        let mut zone = Zone {
+        Zone {
             merged: Merged::None,
             // The strength bounds the hardening from outside: its solution is where to begin.
             shear: if limit > margin {
@@ -162,7 +160,16 @@ impl Soil {
             cylinder: cap > margin && trial.s.iter().sum::<f64>() <= 0.0,
             tension: tension > margin,
             ..Zone::ELASTIC
-        };
+        }
+    }
+
+    /// Returns a trial stress, Eq. (15). None if the iterations fail: then a smaller step may not.
+    /// `guess` are zone and multipliers of a return from nearby.
+    #[inline]
+    pub(crate) fn return_stress(&self, trial: &Trial, guess: Option<&End>) -> Option<End> {
+        let size = self.size(&trial.s);
+        let margin = MARGIN * size;
+        let mut zone = self.violated(trial, margin);
         if zone.is_elastic() {
             return Some(End {
                 zone,

@@ -177,13 +177,12 @@ impl Soil {
                 slowing: part.increment.slowing,
                 theta,
             };
-            let end = match self.return_stress(&trial, guess) {
-                Some(end) => end,
-                None => {
-                    trial.theta = 1.0;
-                    self.return_stress(&trial, None)?
-                }
-            };
+            let mut end = self.return_stress(&trial, guess);
+            if end.is_none() {
+                trial.theta = 1.0;
+                end = self.return_stress(&trial, None);
+            }
+            let end = end?;
             Some((principal, trial, end))
         };
         let stiffness = |minor| part.increment.stiffening * self.stiffness(minor).0;
