@@ -27,6 +27,7 @@ pub(crate) enum Merged {
 
 /// The active surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(clippy::struct_excessive_bools, reason = "surfaces are active or not")]
 pub(crate) struct Zone {
     pub(crate) merged: Merged,
     pub(crate) shear: Shear,
@@ -139,16 +140,13 @@ impl Soil {
         ]
     }
 
-    /// Returns a trial stress, Eq. (15). None if the iterations fail: then a smaller step may not.
-    /// `guess` are zone and multipliers of a return from nearby.
+    /// The surfaces that a trial stress lies beyond.
     #[inline]
-    pub(crate) fn return_stress(&self, trial: &Trial, guess: Option<&End>) -> Option<End> {
-        let size = self.size(&trial.s);
-        let margin = MARGIN * size;
+    fn violated(&self, trial: &Trial, margin: f64) -> Zone {
         let [shear, limit, cap, tension] = self.excess(&trial.s, trial.p_p, trial.gamma);
         // Beyond the strength, flow along it leaves less to the cap, or nothing.
         let cap = if limit > margin { 0.0 } else { cap };
-        let mut zone = Zone {
+        Zone {
             merged: Merged::None,
             // The strength bounds the hardening from outside: its solution is where to begin.
             shear: if limit > margin {
@@ -162,7 +160,16 @@ impl Soil {
             cylinder: cap > margin && trial.s.iter().sum::<f64>() <= 0.0,
             tension: tension > margin,
             ..Zone::ELASTIC
-        };
+        }
+    }
+
+    /// Returns a trial stress, Eq. (15). None if the iterations fail: then a smaller step may not.
+    /// `guess` are zone and multipliers of a return from nearby.
+    #[inline]
+    pub(crate) fn return_stress(&self, trial: &Trial, guess: Option<&End>) -> Option<End> {
+        let size = self.size(&trial.s);
+        let margin = MARGIN * size;
+        let mut zone = self.violated(trial, margin);
         if zone.is_elastic() {
             return Some(End {
                 zone,
@@ -231,10 +238,13 @@ impl Soil {
                     for (x, is_active) in multipliers.iter_mut().zip(is_active) {
                         *x = if is_active { *x } else { 0.0 };
                     }
-                    zone = Zone {
-                        merged: base,
-                        ..other
-                    };
+                    // Less flow may not close the gap any more; more flow does.
+                    let is_less = (zone.cap && !other.cap)
+                        || (zone.shear != Shear::None && other.shear == Shear::None);
+                    zone = other;
+                    if is_less {
+                        zone.merged = base;
+                    }
                     if zone.shear == Shear::None && !zone.cap {
                         zone.merged = Merged::None;
                     }
@@ -342,21 +352,30 @@ impl Soil {
         }
     }
 
-    /// Rates of an end, from the rates of what it depends on.
+    /// The equations that an end satisfies, if it is neither elastic nor the corner.
     #[inline]
-    pub(crate) fn end_rates(&self, trial: &Trial, end: &End, of: &Rates) -> Rates {
-        match end.iterate {
-            Some(iterate) => {
-                let hardening = self.cap.hardening(self, trial.p_p);
-                System::new(self, trial, end.zone, hardening).rates(&iterate, of)
-            }
-            None if end.zone.corner => Rates { s: [0.0; 3], ..*of },
-            None => *of,
-        }
+    pub(crate) fn system<'a>(
+        &'a self,
+        trial: &'a Trial,
+        end: &End,
+    ) -> Option<(System<'a>, Iterate)> {
+        let hardening = self.cap.hardening(self, trial.p_p);
+        let iterate = end.iterate?;
+        Some((System::new(self, trial, end.zone, hardening), iterate))
     }
 }
 
 impl End {
+    /// Rates of an end, from the rates of what it depends on.
+    #[inline]
+    pub(crate) fn rates(&self, system: Option<&(System<'_>, Iterate)>, of: &Rates) -> Rates {
+        match system {
+            Some((system, iterate)) => system.rates(iterate, of),
+            None if self.zone.corner => Rates { s: [0.0; 3], ..*of },
+            None => *of,
+        }
+    }
+
     /// What the return leaves of a shear stress between two principal axes, Eq. (20).
     #[inline]
     pub(crate) fn kappa(&self, soil: &Soil, trial: &Trial, [i, j]: [usize; 2]) -> f64 {
@@ -405,12 +424,13 @@ fn solve(system: &System<'_>, mut multipliers: [f64; 2], size: f64) -> Option<It
     let mut before = f64::INFINITY;
     for _ in 0..MAX_ITERATIONS {
         let end = system.at(multipliers);
-        let residual = end.residual[0].abs().max(end.residual[1].abs()) / size;
+        // A sum: the larger of two numbers would hide one that is none.
+        let residual = (end.residual[0].abs() + end.residual[1].abs()) / size;
+        if !(end.s[0] + end.s[1] + end.s[2] + residual).is_finite() {
+            return None;
+        }
         if residual <= 1e-15 || (residual <= 1e-12 && residual >= 0.5 * before) {
             return Some(end);
-        }
-        if !residual.is_finite() {
-            return None;
         }
         before = residual;
         let step = end.correction(&end.residual);

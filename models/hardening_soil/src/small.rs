@@ -192,10 +192,14 @@ impl SmallStrain {
         let least = memory.least.min(end);
         let back = turn.back(&new);
         Remembered {
-            memory: Memory {
-                strain: array::from_fn(|i| if i < 3 { back[i] } else { 2.0 * back[i] }),
-                branch,
-                least,
+            memory: if moves {
+                Memory {
+                    strain: array::from_fn(|i| if i < 3 { back[i] } else { 2.0 * back[i] }),
+                    branch,
+                    least,
+                }
+            } else {
+                *memory
             },
             mean: self.mean(from, to, branch),
             end,

@@ -217,7 +217,7 @@ impl Soil {
     pub(crate) fn gamma(&self, q: f64, minor: f64) -> (f64, f64, f64) {
         let (power, power_slope) = self.power(minor);
         let (q_f, q_f_slope) = self.q_f(minor);
-        let q_a = q_f / self.r_f;
+        let q_a = q_f.max(f64::EPSILON * self.strength) / self.r_f;
         let x = if q > 0.0 {
             (q / q_a).min(self.r_f)
         } else {

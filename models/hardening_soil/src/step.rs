@@ -17,10 +17,10 @@ const SMALL_STRESS: f64 = 0.02;
 const NEARLY: f64 = 1e-4;
 
 /// Halvings of a step.
-const MAX_HALVINGS: u32 = 16;
+const MAX_HALVINGS: u32 = 10;
 
 /// Steps, whole ones and halves, in an increment.
-const MAX_ATTEMPTS: u32 = 2000;
+const MAX_ATTEMPTS: u32 = 400;
 
 /// Stress and internal variables on their way through an increment.
 #[derive(Clone, Copy, Debug)]
@@ -177,13 +177,12 @@ impl Soil {
                 slowing: part.increment.slowing,
                 theta,
             };
-            let end = match self.return_stress(&trial, guess) {
-                Some(end) => end,
-                None => {
-                    trial.theta = 1.0;
-                    self.return_stress(&trial, None)?
-                }
-            };
+            let mut end = self.return_stress(&trial, guess);
+            if end.is_none() {
+                trial.theta = 1.0;
+                end = self.return_stress(&trial, None);
+            }
+            let end = end?;
             Some((principal, trial, end))
         };
         let stiffness = |minor| part.increment.stiffening * self.stiffness(minor).0;
@@ -249,6 +248,7 @@ impl Soil {
             0.0
         };
         let (start, turn_1, turn_2) = (step.start.turn(), axes_1.turn(), axes_2.turn());
+        let (system_1, system_2) = (self.system(trial_1, end_1), self.system(trial_2, end_2));
         let mut error = [0.0; N];
         let columns = array::from_fn(|j| {
             let column = &from.columns[j];
@@ -274,14 +274,14 @@ impl Soil {
             of.E = stiffening * E_0_slope * d_s_0[2] + stiffening_slope[j] * E_0;
             of.s = turn_1.normal(&trial(trial_1.E, of.E));
             of.sin_psi = (at_0[1] + at_0[2]) * d_x_0;
-            let d_s_1 = self.end_rates(trial_1, end_1, &of).s;
+            let d_s_1 = end_1.rates(system_1.as_ref(), &of).s;
             let d_middle = 0.5 * (d_s_0[2] + d_s_1[2]);
             of.E = stiffening * E_slope * d_middle + stiffening_slope[j] * E;
             let moved = turn_2.stress(&trial(trial_2.E, of.E));
             of.s = [moved[0], moved[1], moved[2]];
             let d_x_1 = x_1_by_q * (d_s_1[0] - d_s_1[2]) + x_1_by_minor * d_s_1[2];
             of.sin_psi = over[1] * d_x_0 + over[2] * d_x_1;
-            let end = self.end_rates(trial_2, end_2, &of);
+            let end = end_2.rates(system_2.as_ref(), &of);
             let d_size = by_size * self.size_rate(&s_0, &d_s_0);
             error[j] = (sign * (end.s[worst] - d_s_1[worst]) - d_size) / step.size;
             let kept: [f64; N] = array::from_fn(|i| {

@@ -40,7 +40,10 @@ fn tangents_are_differences() {
                 [5e-4, 4.5e-4, -1e-3, 1e-5, 2e-5, 3e-5],
             ] {
                 let path = Path::new(&law, s);
-                assert!(check(&path, &increment).unwrap() < 1e-7, "{s:?} {increment:?}");
+                assert!(
+                    check(&path, &increment).unwrap() < 1e-7,
+                    "{s:?} {increment:?}"
+                );
             }
         }
     }
