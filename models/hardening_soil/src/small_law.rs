@@ -62,7 +62,7 @@ impl ContinuumLaw for HardeningSoilSmall {
     const DESCRIPTION: Description = abi::describe! {
         id: "hardening_soil_small",
         name: "hardening soil with small-strain stiffness",
-        doc: "Hardening soil whose shear modulus decays with the strain since the last reversal.",
+        doc: "Experimental: hardening soil whose shear modulus decays with the strain since the last reversal.",
         references: "Benz (2007); Benz, Vermeer & Schwab (2009)",
     };
     type Parameters = SmallParameters;

@@ -71,11 +71,8 @@ const FAULTS: [(&str, [&str; 2], &str, &str, &str); 18] = [
     (
         "six",
         [
-            "ntens = [6]
-    expand = true
-    ",
-            "ntens = [4, 6]
-    ",
+            "ntens = [6]\nexpand = true\n",
+            "ntens = [4, 6]\n",
         ],
         "routine-answers",
         "failed",
