@@ -13,7 +13,8 @@ const LONG_ENOUGH: f64 = 1.0;
 const OF_THE_READER: [&str; 3] = ["mysand.f", "driver.toml", "<id>"];
 
 /// Programs of others that commands start. Their examples have their own tests, where there is a repository.
-const OF_OTHERS: [&str; 6] = [
+const OF_OTHERS: [&str; 7] = [
+    "python3",
     "sbatch",
     "snakemake",
     "srun",

@@ -157,6 +157,8 @@ fn laws_are_found_with_the_program_wherever_it_lies() {
         "coulomb_joint",
         "cyclic_joint",
         "elastic",
+        "hardening_soil",
+        "hardening_soil_small",
         "hyperbolic_joint",
         "mepi",
         "mepi_softening",

@@ -70,10 +70,7 @@ const FAULTS: [(&str, [&str; 2], &str, &str, &str); 18] = [
     ),
     (
         "six",
-        [
-            "ntens = [6]\nexpand = true\n",
-            "ntens = [4, 6]\n",
-        ],
+        ["ntens = [6]\nexpand = true\n", "ntens = [4, 6]\n"],
         "routine-answers",
         "failed",
         "writes beyond the end of STRESS",
