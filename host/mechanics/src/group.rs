@@ -5,10 +5,10 @@
 //!
 //! | | |
 //! |---|---|
-//! | [`state`] | strains, stresses, internal variables: committed, restored, saved |
-//! | [`integration`] | points carried through the law; stresses and tangents of the elements |
-//! | [`diagnosis`] | what is found out about points that give way, wrong tangents, bonds |
-//! | [`readings`], [`tied_faces`] | what others read of a group |
+//! | `state` | strains, stresses, internal variables: committed, restored, saved |
+//! | `integration` | points carried through the law; stresses and tangents of the elements |
+//! | `diagnosis` | what is found out about points that give way, wrong tangents, bonds |
+//! | `readings`, `tied_faces` | what others read of a group |
 
 mod diagnosis;
 mod integration;
