@@ -15,7 +15,7 @@ const AIM: f64 = 3e-3;
 const ROUND_OFF: f64 = 1e-9;
 /// Shortest and longest part of a step that is taken again.
 const PART: [f64; 2] = [0.02, 0.98];
-/// From so many steps taken back on they are halved, and no more than so many are.
+/// Repeated steps after which the next ones are halved, and the largest number of repeated steps.
 const HALVED: usize = 8;
 const MOST: usize = 40;
 

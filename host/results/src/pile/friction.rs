@@ -1,10 +1,10 @@
 //! What holds along the shaft: friction, normal stress and slip at the rows of `pile.csv`.
 //!
-//! An interface of some stiffness lets its tractions swing from node to node about their mean. So the values at the
-//! ends of elements are read from the means of the two elements beside them, and the one in the middle follows
-//! from the element's own mean: by Simpson's rule the three give it back, which is the element's force over its area.
-//! Where friction and normal stress would be no mean of the tractions in the element, as at the edge of a part that
-//! slides, the tractions at its ends are taken as they are: no value is beyond a convex limit of the law.
+//! Tractions of a stiff interface oscillate from node to node about their mean, so they are smoothed. The value at an
+//! element end is interpolated between the means of the two adjacent elements. The value in the middle then follows
+//! from the mean of the element, so that Simpson's rule gives the element's force over its area.
+//! Smoothing must not exceed the strength of the law. If the middle would leave the range that the tractions of the
+//! element span, its ends keep their tractions; this happens at the edge of a part that slides.
 
 use super::geometry::{Facet, Geometry};
 use super::rows::Span;

@@ -1,4 +1,4 @@
-//! Net forces: the change of a pile's forces since the last phase that counts displacements anew.
+//! Net forces: the change of a pile's forces since the last phase with `reset_displacements`.
 
 use super::State;
 use mechanics::Problem;

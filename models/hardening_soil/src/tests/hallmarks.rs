@@ -50,7 +50,7 @@ fn the_secant_at_half_the_strength_is_e_50() {
     }
 }
 
-/// The cap lowers the secant of a normally consolidated soil: values of an independent integration.
+/// The cap lowers the secant of a normally consolidated soil.
 #[test]
 fn the_cap_lowers_the_secant_of_normal_consolidation() {
     let law = law(DENSE);
