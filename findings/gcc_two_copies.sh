@@ -4,7 +4,7 @@
 # A good guess: each copy has its own variable, and one that is opened again begins anew.
 # Seen: there is one variable for both copies: the parameter of the second material is that of the first. Closing does not unload the copy.
 # The compiler marks the symbol as unique in the process. With -fno-gnu-unique, or in a function that is not inline, both are as guessed.
-# Source: the manual of GCC 12, section 3.16, -fno-gnu-unique.
+# Source: the manual of GCC 12, options for code generation conventions, -fno-gnu-unique.
 set -euo pipefail
 place=$(mktemp -d) && trap 'rm -rf "$place"' EXIT && cd "$place"
 # With what it needs and this system has not.

@@ -4,7 +4,7 @@
 # A good guess: `double precision` remains what it is, 8 bytes.
 # Seen: it has 16 bytes then. The routine reads two of the caller's numbers as one, and writes twice as far. `real*8` remains 8 bytes, as does
 # `double precision` with -fdefault-double-8 as well, or with -freal-4-real-8 alone.
-# Source: the manual of GNU Fortran 12, section 2.2, -fdefault-real-8.
+# Source: the manual of GNU Fortran 12, options controlling Fortran dialect, -fdefault-real-8.
 set -euo pipefail
 place=$(mktemp -d) && trap 'rm -rf "$place"' EXIT && cd "$place"
 # With what it needs and this system has not.

@@ -4,7 +4,7 @@
 # A good guess: each thread reads what it wrote, since local variables are on the stack.
 # Seen: up to 65536 bytes (8192 numbers) they are. One number more, and the array is in static memory: both threads read what one of them wrote,
 # and only -Wall warns of it. With -frecursive, which -fopenmp implies, each reads its own.
-# Source: the manual of GNU Fortran 12, section 2.9, -fmax-stack-var-size.
+# Source: the manual of GNU Fortran 12, options for code generation conventions, -fmax-stack-var-size.
 set -euo pipefail
 place=$(mktemp -d) && trap 'rm -rf "$place"' EXIT && cd "$place"
 # With what it needs and this system has not.
