@@ -7,6 +7,9 @@ use abi::Failure;
 /// Rounding of a sum, relative to its largest term.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
+/// Doublings that lead from any first step to any last one.
+const MAX_STEPS: usize = 2000;
+
 /// What flows.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Flow<'a> {
@@ -105,33 +108,57 @@ impl Flow<'_> {
         self.at(slip, sigma)
     }
 
-    /// The end of the slip; none if it leaves no normal stress.
-    ///
-    /// # Errors
-    /// The slip is not a number.
+    /// What the first of Eq. (a) lacks after a slip, and its slope.
     #[inline]
-    pub(crate) fn end(&self) -> Result<Option<Sample>, Failure> {
+    fn excess(&self, slip: f64, sample: &Sample) -> (f64, f64) {
+        let p = &self.law.parameters;
+        let (k_n, k_t) = (p.normal_stiffness, p.shear_stiffness);
+        let normal = 1.0 - k_n * sample.dilation_by_psi * sample.psi_slope;
+        let sigma_slope = k_n * sample.dilation_by_slip / normal;
+        let by_sigma = sample.mu + sample.sigma * sample.mu_by_psi * sample.psi_slope;
+        (
+            k_t * slip + sample.mu * sample.sigma - self.tau,
+            k_t + sample.mu_by_slip * sample.sigma + by_sigma * sigma_slope,
+        )
+    }
+
+    /// Slips on both sides of the first root that steps find, each twice as long as the last; none if
+    /// there is none.
+    #[inline]
+    fn bracket(&self, noise: f64) -> Option<[f64; 2]> {
         let k_t = self.law.parameters.shear_stiffness;
-        let k_n = self.law.parameters.normal_stiffness;
         // While μ < 0 the interface contracts, so that σ_n does not rise above its trial.
         let limit = (self.tau + (-self.ratio).max(0.0) * self.sigma.max(0.0)) / k_t;
-        let excess = |slip: f64, sample: &Sample| k_t * slip + sample.mu * sample.sigma - self.tau;
-        if !(limit > 0.0 && excess(limit, &self.after(limit)) >= 0.0) {
-            return Ok(None);
+        if limit.is_nan() || limit <= 0.0 {
+            return None;
         }
-        let noise = ROUNDING * (self.tau.abs() + k_t * limit);
-        let slip = root::between(0.0, limit, 0.0, noise, |slip| {
-            let sample = self.after(slip);
-            let normal = 1.0 - k_n * sample.dilation_by_psi * sample.psi_slope;
-            let sigma_slope = k_n * sample.dilation_by_slip / normal;
-            let by_sigma = sample.mu + sample.sigma * sample.mu_by_psi * sample.psi_slope;
-            let slope = k_t + sample.mu_by_slip * sample.sigma + by_sigma * sigma_slope;
-            (excess(slip, &sample), slope)
+        let (value, slope) = self.excess(0.0, &self.after(0.0));
+        let newton = -2.0 * value / slope;
+        let (mut low, mut high) = (0.0, if newton > 0.0 { newton } else { 1e-3 * limit });
+        for _ in 0..MAX_STEPS {
+            high = high.min(limit);
+            let sample = self.after(high);
+            if sample.sigma > 0.0 && self.excess(high, &sample).0 >= -noise {
+                return Some([low, high]);
+            }
+            if high.is_nan() || high >= limit {
+                break;
+            }
+            low = high;
+            high *= 2.0;
+        }
+        None
+    }
+
+    /// The end of the slip; none if it leaves no normal stress.
+    #[inline]
+    pub(crate) fn end(&self) -> Option<Sample> {
+        let noise = ROUNDING * (self.tau.abs() + (self.ratio * self.sigma).abs());
+        let [low, high] = self.bracket(noise)?;
+        let slip = root::between(low, high, low, noise, |slip| {
+            self.excess(slip, &self.after(slip))
         });
-        if !slip.is_finite() {
-            return Err(Failure::Numeric("the plastic slip is not a number"));
-        }
-        Ok(Some(self.after(slip)).filter(|end| end.sigma > 0.0))
+        Some(self.after(slip)).filter(|end| end.sigma > 0.0)
     }
 
     /// Eq. (11): ∂(`t_n`, s τ)/∂(`u_n`, s `u_t`) at the end.

@@ -215,8 +215,8 @@ impl CriticalStateJoint {
         let void_ratio = self.void_ratio(&state, part.opening);
         // Eq. (2).
         let excess = tau_trial - state.back_stress_ratio * sigma_trial;
-        let limit = p.elastic_range * sigma_trial;
-        if sigma_trial >= 0.0 && excess.abs() <= limit * (1.0 + 4.0 * f64::EPSILON) {
+        let limit = p.elastic_range * sigma_trial + 8.0 * f64::EPSILON * tau_trial.abs();
+        if sigma_trial >= 0.0 && excess.abs() <= limit {
             let state = State {
                 void_ratio,
                 gap: 0.0,
@@ -233,7 +233,7 @@ impl CriticalStateJoint {
             ratio: sign * state.back_stress_ratio + p.elastic_range,
             void_ratio,
         };
-        match flow.end()? {
+        match flow.end() {
             Some(end) => self.slid(&flow, &end, sign, &part),
             None => Ok(self.open(contact)),
         }
