@@ -81,6 +81,7 @@ fn json_says_the_same() {
         .collect();
     for id in [
         "coulomb_joint",
+        "critical_state_joint",
         "cyclic_joint",
         "elastic",
         "hyperbolic_joint",

@@ -27,6 +27,11 @@ fn coulomb_joint_passes() {
 }
 
 #[test]
+fn critical_state_joint_passes() {
+    passes(&library_of("critical_state_joint"));
+}
+
+#[test]
 fn cyclic_joint_passes() {
     passes(&library_of("cyclic_joint"));
 }

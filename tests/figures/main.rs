@@ -87,6 +87,12 @@ const COMMITTED: &[Committed] = &[
         &["shear_stress", "normal_stress"],
     ),
     (
+        "measured_interface_praai/state.toml",
+        "",
+        "*",
+        &["cycles_normal_stress", "cycles_slip"],
+    ),
+    (
         "settling_clay_pile/case.toml",
         "floating",
         "*_floating",

@@ -155,6 +155,7 @@ fn laws_are_found_with_the_program_wherever_it_lies() {
     let place = Place::new();
     let all = [
         "coulomb_joint",
+        "critical_state_joint",
         "cyclic_joint",
         "elastic",
         "hardening_soil",

@@ -57,6 +57,14 @@ fn laws_for_solids() {
 fn laws_for_interfaces() {
     let joint = [1e6, 4e5, 1.0, 30.0, 5.0];
     compare("coulomb_joint", "CoulombJoint", -100.0, 1e-4, &joint);
+    let critical = [1e6, 4e5, 30.0, 0.96, 1e6, 0.29, 1.1, 3.5, 1e-4, 5e-3, 0.7];
+    compare(
+        "critical_state_joint",
+        "CriticalStateJoint",
+        -100.0,
+        1e-5,
+        &critical,
+    );
     let cyclic = [1e6, 4e5, 35.0, 25.0, 5e-3, 2.0, 1e-3];
     compare("cyclic_joint", "CyclicJoint", -100.0, 1e-4, &cyclic);
     let hyperbolic = [1e6, 2e4, 0.6, 0.85, 4.0, 30.0];

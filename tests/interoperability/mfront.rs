@@ -188,6 +188,7 @@ fn bounds_and_defaults_of_our_laws_are_exported() {
         ("mohr_coulomb", "3d"),
         ("oriented_mohr_coulomb", "axisymmetric"),
         ("coulomb_joint", "interface_2d"),
+        ("critical_state_joint", "interface_2d"),
         ("cyclic_joint", "interface_2d"),
         ("hyperbolic_joint", "interface_2d"),
         ("mepi", "interface_2d"),

@@ -9,6 +9,7 @@
 #![allow(clippy::doc_markdown, reason = "the headers hold formulas")]
 
 mod coulomb_joint;
+mod critical_state_joint;
 mod cyclic_joint;
 mod driver;
 mod elastic;
