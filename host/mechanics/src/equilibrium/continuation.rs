@@ -5,10 +5,12 @@
 //! |---|---|
 //! | [`load_step`] | steps to a given load factor |
 //! | [`arc_length`] | steps along the path of equilibrium, whose load factor is unknown |
+//! | [`regularised`] | corrections with a share of the elastic stiffness, where Newton iterations get on slowly |
 //! | [`viscous`], [`viscous_motion`] | from a standstill to an equilibrium: when, and how |
 
 mod arc_length;
 mod load_step;
+mod regularised;
 mod viscous;
 mod viscous_motion;
 
@@ -113,7 +115,7 @@ impl Newton<'_> {
                 Ok(StepSuccess {
                     relaxed: viscous.has_led_here(),
                     was_kept: self.keeps(),
-                    was_motion: viscous.lets_expect_another(),
+                    was_motion: viscous.lets_expect_another() || control.regularised.has_begun(),
                     open,
                     ..equilibrium.reached(iterations)
                 })

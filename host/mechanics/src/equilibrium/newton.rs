@@ -28,7 +28,7 @@ mod reference;
 mod residual;
 mod round_off;
 
-pub(super) use acceleration::Acceleration;
+pub(super) use acceleration::{Acceleration, dot};
 pub use failure::{
     Criterion, Culprit, DomainFailure, Imbalance, Iterations, Motion, PointPlace, Reason, Runaway,
     Singularity, StepFailure, Symptom, Unmet,

@@ -4,6 +4,7 @@
 //! state; slow corrections are accelerated.
 
 use super::STEP_LENGTHS;
+use super::regularised::Regularised;
 use super::viscous::{Viscous, stands_still};
 use crate::equilibrium::newton::{
     Acceleration, Control, Correction, Iteration, LineSearch, Newton, Otherwise, State,
@@ -28,6 +29,7 @@ pub(super) struct LoadControl {
     guess: Option<Vec<f64>>,
     /// With a quasi-Newton matrix, and with others as long as slow corrections do.
     acceleration: Option<Acceleration>,
+    pub(super) regularised: Regularised,
     pub(super) viscous: Viscous,
     /// Displacement increments that left the least out of balance, and how much, relative.
     least: Option<(Vec<f64>, f64)>,
@@ -52,6 +54,7 @@ impl LoadControl {
             task,
             guess,
             acceleration: is_slow.then(Acceleration::default),
+            regularised: Regularised::new(is_expected),
             viscous: Viscous::new(newton.settings, is_expected),
             least: None,
             predicted: None,
@@ -114,7 +117,7 @@ impl Control for LoadControl {
         state: &State,
         iterations: &[Iteration],
     ) -> Option<f64> {
-        if self.viscous.has_arrived() {
+        if self.viscous.has_arrived() || self.regularised.has_settled {
             return Some(0.0);
         }
         if newton.is_equilibrium(&state.balance, iterations.last()?) {
@@ -123,8 +126,8 @@ impl Control for LoadControl {
         // What rounding leaves is looked for only where iterations lead no further: it costs two
         // evaluations.
         let series = self.series(iterations);
-        let is_stuck = newton.settings.method.is_newton() && stands_still(series);
-        let ends = is_stuck || newton.is_over(series);
+        let is_plain = newton.settings.method.is_newton() && !self.regularised.has_begun();
+        let ends = is_plain && stands_still(series) || self.is_over(newton, iterations);
         let last = iterations.last()?;
         let is_round_off =
             ends && newton.is_round_off(&state.increment, (&state.balance, last), &self.task);
@@ -137,13 +140,21 @@ impl Control for LoadControl {
         state: &State,
         iterations: &mut Vec<Iteration>,
     ) -> Result<State, StepFailure> {
-        if let Some(state) = self.relieved(newton, state, iterations)? {
+        if !self.regularised.has_begun()
+            && let Some(state) = self.relieved(newton, state, iterations)?
+        {
             return Ok(state);
         }
         match self.corrected(newton, state, iterations) {
             Err(failure) if failure.is_singular() && self.viscous.is_at_hand() => {
                 if self.has_settled(newton, state) {
                     return Err(failure);
+                }
+                if self.may_regularise() && !self.regularised.is_beyond() {
+                    self.regularised.has_tried_newton(false);
+                    self.regularised
+                        .take_over(newton, &self.task, state, iterations)?;
+                    return self.regularised_correction(newton, state, iterations);
                 }
                 self.is_singular = true;
                 self.relieved(newton, state, iterations)?.ok_or(failure)
@@ -163,6 +174,14 @@ impl Control for LoadControl {
 
     fn series<'i>(&self, iterations: &'i [Iteration]) -> &'i [Iteration] {
         self.viscous.series(iterations)
+    }
+
+    fn is_over(&self, newton: &Newton<'_>, iterations: &[Iteration]) -> bool {
+        if self.regularised.has_begun() {
+            let most = newton.settings.max_iterations;
+            return self.regularised.is_over(most, iterations);
+        }
+        newton.is_over(self.series(iterations))
     }
 
     fn has_settled(&self, newton: &mut Newton<'_>, state: &State) -> bool {
@@ -255,6 +274,20 @@ impl LoadControl {
         state: &State,
         iterations: &mut Vec<Iteration>,
     ) -> Result<State, StepFailure> {
+        if self.regularised.has_begun() && !self.regularised.lets_try_newton() {
+            return self.regularised_correction(newton, state, iterations);
+        }
+        if self.may_regularise() && self.regularised.is_due(self.series(iterations)) {
+            let increment = self.least.as_ref().map(|(increment, _)| increment.clone());
+            let at = (
+                increment.unwrap_or_else(|| state.increment.clone()),
+                state.rise,
+            );
+            let state = self.evaluate(newton, at, Operator::None)?;
+            self.regularised
+                .take_over(newton, &self.task, &state, iterations)?;
+            return self.regularised_correction(newton, &state, iterations);
+        }
         if let Some(acceleration) = &self.acceleration {
             newton.kept.stalls = if newton.is_slow() {
                 newton.is_too_slow(iterations, acceleration.begins())
@@ -278,6 +311,9 @@ impl LoadControl {
             iterations.push(taken);
             return Ok(next);
         }
+        if self.may_regularise() && self.regularised.is_expected() {
+            return self.corrected_firmly(newton, state, iterations);
+        }
         let correction = self.correction(newton, state)?;
         let size = norm(&correction.increment) / norm(&state.increment).max(f64::MIN_POSITIVE);
         let ends = newton.probably_ends(state.balance.relative, size);
@@ -285,6 +321,65 @@ impl LoadControl {
         if let Some(acceleration) = &mut self.acceleration {
             acceleration.took(&correction.increment, taken.step_length);
         }
+        iterations.push(taken);
+        Ok(next)
+    }
+
+    /// Whether regularised corrections may take over.
+    fn may_regularise(&self) -> bool {
+        self.acceleration.is_none() && self.viscous.relaxes()
+    }
+
+    /// The state that a whole Newton correction leads to or, if that is not near enough, a regularised one.
+    fn corrected_firmly(
+        &mut self,
+        newton: &mut Newton<'_>,
+        state: &State,
+        iterations: &mut Vec<Iteration>,
+    ) -> Result<State, StepFailure> {
+        let correction = self.correction(newton, state)?;
+        let size = norm(&correction.increment) / norm(&state.increment).max(f64::MIN_POSITIVE);
+        let operator = if newton.probably_ends(state.balance.relative, size) {
+            Operator::None
+        } else {
+            newton.operator()
+        };
+        let at = state.moved_by(1.0, &correction);
+        match self.evaluate(newton, at, operator) {
+            Err(failure) if failure.is_stop() => return Err(failure),
+            Ok(next)
+                if next.balance.relative <= newton.settings.force_tolerance
+                    || self
+                        .regularised
+                        .takes(next.balance.relative / state.balance.relative) =>
+            {
+                self.regularised.has_tried_newton(true);
+                iterations.push(newton.took(&next, &correction.increment, 1.0));
+                return Ok(next);
+            }
+            _ => {}
+        }
+        self.regularised.has_tried_newton(false);
+        iterations.push(Iteration {
+            step_length: 0.0,
+            ..newton.took(state, &correction.increment, 0.0)
+        });
+        self.regularised
+            .take_over(newton, &self.task, state, iterations)?;
+        self.regularised_correction(newton, state, iterations)
+    }
+
+    /// The state that a regularised correction leads to.
+    fn regularised_correction(
+        &mut self,
+        newton: &mut Newton<'_>,
+        state: &State,
+        iterations: &mut Vec<Iteration>,
+    ) -> Result<State, StepFailure> {
+        let mut regularised = std::mem::replace(&mut self.regularised, Regularised::new(false));
+        let corrected = regularised.correct(newton, (&*self, &self.task), state);
+        self.regularised = regularised;
+        let (taken, next) = corrected?;
         iterations.push(taken);
         Ok(next)
     }

@@ -80,6 +80,11 @@ impl Viscous {
         }
     }
 
+    /// Whether laws see one increment from the last equilibrium, with any method that has consistent tangents.
+    pub(super) fn relaxes(&self) -> bool {
+        self.wanted == Some(Motion::Relaxation)
+    }
+
     /// Takes note of a first iterate that did not come from the tangent.
     pub(super) fn starts_from(&mut self, increment: &[f64]) {
         if self.wanted == Some(Motion::Viscous) {

@@ -35,7 +35,6 @@
 
 use crate::assembly::norms;
 use crate::equilibrium::newton::{Balance, Iteration, Motion, Newton, StepFailure, Task, norm};
-use algebra::threads;
 use law::Operator;
 
 /// α at first, and where states change. The chambers with Mohr–Coulomb sand and the bored pile settle
@@ -72,8 +71,6 @@ const LEADS_AWAY: (usize, f64) = (12, 3.0);
 /// Viscous control leads nowhere if this many viscous steps have not brought the residual down to half; of single
 /// corrections more, since every point that breaks raises it.
 const IDLE: [usize; 2] = [40, 120];
-/// Entries of a matrix that one thread takes at a time.
-const PER_TASK: usize = 1 << 16;
 
 /// A motion under way.
 #[derive(Debug)]
@@ -374,33 +371,14 @@ impl Course {
         forces
     }
 
-    /// Solves (K + α K_e) δ = residual with the tangents of the last evaluation, divided by 1 + α. The entries of
-    /// elastic ground then equal those of K_e bit for bit, whatever α, so their Schur complements are reused.
+    /// Solves (K + α K_e) δ = residual with the tangents of the last evaluation.
     fn correction(
         &self,
         newton: &mut Newton<'_>,
         residual: &[f64],
     ) -> Result<Vec<f64>, StepFailure> {
-        let (viscosity, share) = (self.viscosity, 1.0 / (1.0 + self.viscosity));
-        let mut values = newton.equations.solver.room();
-        let stiffness = newton.stiffness();
-        values.resize(stiffness.len(), 0.0);
-        let parts = values.chunks_mut(PER_TASK).zip(stiffness.chunks(PER_TASK));
-        threads::each(
-            parts.zip(self.elastic.chunks(PER_TASK)),
-            |((values, stiffness), elastic)| {
-                for ((value, &now), elastic) in values.iter_mut().zip(stiffness).zip(elastic) {
-                    *value = if now.to_bits() == elastic.to_bits() {
-                        now
-                    } else {
-                        share * (now + viscosity * elastic)
-                    };
-                }
-            },
-        );
-        newton.factorise(values)?;
-        let residual: Vec<f64> = residual.iter().map(|r| share * r).collect();
-        newton.solve(&residual, None)
+        newton.factorise_regularised(&self.elastic, self.viscosity)?;
+        newton.regularised_answer(residual, self.viscosity)
     }
 
     /// Whether a viscous step under viscous control ends in equilibrium: by the residual, and by what is left of the

@@ -13,7 +13,12 @@ use std::collections::BTreeMap;
 
 impl Newton<'_> {
     /// Notes a correction, or a fraction of it, that was taken.
-    pub(super) fn took(&mut self, at: &State, correction: &[f64], length: f64) -> Iteration {
+    pub(in crate::equilibrium) fn took(
+        &mut self,
+        at: &State,
+        correction: &[f64],
+        length: f64,
+    ) -> Iteration {
         self.took_to(&at.balance, correction, &at.increment, length)
     }
 

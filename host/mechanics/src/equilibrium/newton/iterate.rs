@@ -21,6 +21,14 @@ pub(in crate::equilibrium) struct State {
     pub(in crate::equilibrium) balance: Balance,
 }
 
+impl Correction {
+    /// Displacements at a load factor that stays.
+    pub(in crate::equilibrium) fn by(increment: Vec<f64>) -> Self {
+        let rise = 0.0;
+        Self { increment, rise }
+    }
+}
+
 impl State {
     /// Displacement increments and load factor after this fraction of a correction.
     pub(in crate::equilibrium) fn moved_by(
@@ -104,6 +112,11 @@ pub(in crate::equilibrium) trait Control {
         iterations
     }
 
+    /// Whether no more iterations are allowed.
+    fn is_over(&self, newton: &Newton<'_>, iterations: &[Iteration]) -> bool {
+        newton.is_over(self.series(iterations))
+    }
+
     /// Whether an iterate that no correction can be computed for is in equilibrium all the same.
     fn has_settled(&self, _newton: &mut Newton<'_>, _state: &State) -> bool {
         false
@@ -152,7 +165,7 @@ impl Newton<'_> {
                 return Ok(Equilibrium::at(state, round_off));
             }
             control.note(&state);
-            if self.is_over(control.series(iterations)) {
+            if control.is_over(self, iterations) {
                 return self.end_of(control, &state, iterations);
             }
             let before = iterations.len();

@@ -6,7 +6,7 @@ use super::residual::Balance;
 use crate::assembly::{Elements, System};
 use crate::group::Group;
 use crate::settings::Method;
-use algebra::{LinearSolver, Singular, largest};
+use algebra::{LinearSolver, Singular, largest, threads};
 use law::Operator;
 use std::time::Instant;
 
@@ -14,6 +14,8 @@ use std::time::Instant;
 /// is tolerated.
 const NOISE: f64 = 1e-12;
 const LEFT: f64 = 1e-3;
+/// Entries of a matrix that one thread takes at a time.
+const PER_TASK: usize = 1 << 16;
 
 /// Share of the forces in play that each of `n` entries of a residual may have if all together are noise.
 pub(in crate::equilibrium) fn noise(n: usize, force_tolerance: f64) -> f64 {
@@ -187,6 +189,50 @@ impl Newton<'_> {
         let start = Instant::now();
         let outcome = self.equations.solver.factorise(values);
         self.factorised(start, outcome)
+    }
+
+    /// Factorises (K + α K_e) / (1 + α) with the tangents of the last evaluation. The entries of elastic ground then
+    /// equal those of K_e bit for bit, whatever α, so their Schur complements are reused.
+    ///
+    /// # Errors
+    /// It is singular.
+    pub(in crate::equilibrium) fn factorise_regularised(
+        &mut self,
+        elastic: &[f64],
+        alpha: f64,
+    ) -> Result<(), StepFailure> {
+        let share = 1.0 / (1.0 + alpha);
+        let mut values = self.equations.solver.room();
+        let stiffness = self.stiffness();
+        values.resize(stiffness.len(), 0.0);
+        let parts = values.chunks_mut(PER_TASK).zip(stiffness.chunks(PER_TASK));
+        threads::each(
+            parts.zip(elastic.chunks(PER_TASK)),
+            |((values, stiffness), elastic)| {
+                for ((value, &now), elastic) in values.iter_mut().zip(stiffness).zip(elastic) {
+                    *value = if now.to_bits() == elastic.to_bits() {
+                        now
+                    } else {
+                        share * (now + alpha * elastic)
+                    };
+                }
+            },
+        );
+        self.factorise(values)
+    }
+
+    /// Solves (K + α K_e) δ = residual with that matrix.
+    ///
+    /// # Errors
+    /// The matrix is singular.
+    pub(in crate::equilibrium) fn regularised_answer(
+        &mut self,
+        residual: &[f64],
+        alpha: f64,
+    ) -> Result<Vec<f64>, StepFailure> {
+        let share = 1.0 / (1.0 + alpha);
+        let residual: Vec<f64> = residual.iter().map(|r| share * r).collect();
+        self.solve(&residual, None)
     }
 
     fn factorised(

@@ -173,6 +173,21 @@ impl Newton<'_> {
         Ok(true)
     }
 
+    /// Lets the groups hold the consistent tangents of this state, which was evaluated last.
+    ///
+    /// # Errors
+    /// A law fails.
+    pub(in crate::equilibrium) fn tangents_at(
+        &mut self,
+        increment: &[f64],
+        task: &Task,
+    ) -> Result<(), StepFailure> {
+        if self.kept.tangents != Operator::Consistent {
+            self.evaluate(increment, task, Operator::Consistent)?;
+        }
+        Ok(())
+    }
+
     /// Takes up what the last correction achieved, and renews the matrix where the method wants it.
     /// Says whether there is another one now.
     pub(in crate::equilibrium) fn renew(

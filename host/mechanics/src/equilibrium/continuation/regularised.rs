@@ -1,0 +1,290 @@
+//! Regularised Newton iterations, where plain ones get on slowly.
+//!
+//! If flow is not associated, the tangent K of a state may be indefinite, and Newton iterations alternate between
+//! pieces of the law. Corrections with a share of the elastic stiffness K_e,
+//!
+//!   (K + α K_e) δ = r,
+//!
+//! are smaller where the body is soft, and go on in one direction. They approach equilibrium linearly;
+//! [Anderson acceleration](Acceleration) makes that faster. Nothing is committed: laws see one increment from the last
+//! equilibrium.
+//!
+//! A regularised correction is smaller than the error, so its size alone accepts nothing. If the last corrections
+//! shrink by a factor ρ < 1 each, those to come add up to ρ/(1 − ρ) times the last one, and that is held against the
+//! tolerance. A body that moves on at constant speed (ρ = 1: a mechanism, until other points yield or unload) is in no
+//! equilibrium, however small its residual. It is followed by long moves along the same correction.
+
+use crate::equilibrium::newton::{
+    Acceleration, Control, Correction, Iteration, Newton, State, StepFailure, Task, dot, norm,
+};
+use law::Operator;
+
+/// α.
+const SHARE: f64 = 0.1;
+/// A whole Newton correction is taken if it leaves no more than this share of the residual.
+const HALF: f64 = 0.5;
+/// The first corrections of a step may leave more.
+const FIRST: f64 = 3.0;
+/// Newton iterations without a gain of a tenth after which regularised ones begin.
+const PATIENCE: usize = 4;
+/// Another Newton correction is tried after this many regularised ones in a row that did so.
+const HALVINGS: usize = 2;
+/// Corrections are even, as those of a constant speed, if the cosine between them and the ratio of their sizes are
+/// at least this, three times in a row.
+const EVEN: (f64, f64, usize) = (0.95, 0.8, 3);
+/// An accelerated correction is not taken if the cosine between it and the plain one is less than this.
+const ALONG: f64 = 0.3;
+/// Growth of a long move from one trial to the next; largest one, relative to the increment.
+const GROWTH: f64 = 3.0;
+const LONGEST: f64 = 0.5;
+/// A long move may raise the residual by this factor, and up to the tolerance.
+const RISE: f64 = 1.2;
+/// Regularised corrections of a step, and those without a gain of a tenth that are a standstill.
+const MOST: usize = 80;
+const STANDSTILL: usize = 60;
+const GAIN: f64 = 0.9;
+
+/// Regularised iterations of a step.
+#[derive(Debug)]
+pub(super) struct Regularised {
+    /// Elastic stiffness, in the matrix's pattern; without the domain.
+    elastic: Vec<f64>,
+    moves: Acceleration,
+    /// The last correction before acceleration, and the sizes of those since the last long move.
+    last: Vec<f64>,
+    sizes: Vec<f64>,
+    /// Even corrections in a row.
+    even: usize,
+    /// Corrections in a row that each halved the residual.
+    halvings: usize,
+    /// The last step needed them.
+    is_expected: bool,
+    /// Where these iterations start, once they have.
+    since: Option<usize>,
+    /// The regularised matrix was singular.
+    is_beyond: bool,
+    /// The present state is an equilibrium by the rate of the corrections.
+    pub(super) has_settled: bool,
+}
+
+impl Regularised {
+    /// After a step that needed them, or one that did not.
+    pub(super) fn new(is_expected: bool) -> Self {
+        Self {
+            elastic: Vec::new(),
+            moves: Acceleration::default(),
+            last: Vec::new(),
+            sizes: Vec::new(),
+            even: 0,
+            halvings: 0,
+            is_expected,
+            since: None,
+            is_beyond: false,
+            has_settled: false,
+        }
+    }
+
+    /// Whether Newton corrections have to halve the residual from the start.
+    pub(super) fn is_expected(&self) -> bool {
+        self.is_expected || self.has_begun()
+    }
+
+    /// Whether even the last regularised matrix was singular.
+    pub(super) fn is_beyond(&self) -> bool {
+        self.is_beyond
+    }
+
+    /// Whether Newton iterations get on slowly.
+    pub(super) fn is_due(&self, series: &[Iteration]) -> bool {
+        let Some(start) = series
+            .len()
+            .checked_sub(PATIENCE)
+            .filter(|start| *start > 0)
+        else {
+            return false;
+        };
+        !self.has_begun() && least(&series[start..]) > GAIN * least(&series[..start])
+    }
+
+    /// Whether they have begun.
+    pub(super) fn has_begun(&self) -> bool {
+        self.since.is_some()
+    }
+
+    /// Makes ready for corrections of a state, which need not have been evaluated last.
+    ///
+    /// # Errors
+    /// A law fails, or has no elastic operator.
+    pub(super) fn take_over(
+        &mut self,
+        newton: &mut Newton<'_>,
+        task: &Task,
+        state: &State,
+        iterations: &[Iteration],
+    ) -> Result<(), StepFailure> {
+        if self.since.is_none() {
+            let still = vec![0.0; state.increment.len()];
+            newton.evaluate(&still, task, Operator::Elastic)?;
+            self.elastic = newton.stiffness().to_vec();
+            self.since = Some(iterations.len());
+        }
+        newton.evaluate(&state.increment, task, Operator::Consistent)?;
+        Ok(())
+    }
+
+    /// Whether a Newton correction is taken that leaves this share of the residual.
+    pub(super) fn takes(&self, left: f64) -> bool {
+        left <= if self.has_begun() { HALF } else { FIRST }
+    }
+
+    /// Whether a Newton correction may get on faster.
+    pub(super) fn lets_try_newton(&self) -> bool {
+        self.halvings >= HALVINGS
+    }
+
+    /// A Newton correction was tried: taken, or in vain.
+    pub(super) fn has_tried_newton(&mut self, was_taken: bool) {
+        self.moves = Acceleration::default();
+        self.has_settled = false;
+        if was_taken {
+            self.sizes.clear();
+            self.even = 0;
+        } else {
+            self.halvings = 0;
+        }
+    }
+
+    /// Whether they have come to their end.
+    pub(super) fn is_over(&self, most: Option<usize>, iterations: &[Iteration]) -> bool {
+        let Some(series) = self.since.and_then(|since| iterations.get(since..)) else {
+            return false;
+        };
+        let stands_still = || {
+            let (before, after) = series.split_at(series.len() - STANDSTILL);
+            !before.is_empty() && least(after) > GAIN * least(before)
+        };
+        series.len() >= most.unwrap_or(MOST) || series.len() > STANDSTILL && stands_still()
+    }
+
+    /// The state that the next correction leads to.
+    ///
+    /// # Errors
+    /// The step is stopped, or a law or the equations failed.
+    pub(super) fn correct(
+        &mut self,
+        newton: &mut Newton<'_>,
+        (control, task): (&impl Control, &Task),
+        state: &State,
+    ) -> Result<(Iteration, State), StepFailure> {
+        newton.tangents_at(&state.increment, task)?;
+        let share = SHARE;
+        self.is_beyond = true;
+        newton.factorise_regularised(&self.elastic, share)?;
+        self.is_beyond = false;
+        let plain = newton.regularised_answer(&state.balance.residual, share)?;
+        let size = norm(&plain);
+        let (cosine, ratio) = (self.cosine(&plain), size / norm(&self.last));
+        let is_even = cosine >= EVEN.0 && (EVEN.1..=1.0 / EVEN.1).contains(&ratio);
+        self.even = if is_even { self.even + 1 } else { 0 };
+        self.last.clone_from(&plain);
+        self.sizes.push(size);
+        let improved = self.moves.improve(plain);
+        let (correction, length, next) = if self.even >= EVEN.2 {
+            self.moves = Acceleration::default();
+            self.sizes.clear();
+            let correction = Correction::by(self.last.clone());
+            let (length, next) = far_along(newton, control, state, &correction)?;
+            (correction, length, next)
+        } else {
+            let is_along = self.cosine(&improved) >= ALONG;
+            let chosen = if is_along {
+                improved
+            } else {
+                self.last.clone()
+            };
+            let correction = Correction::by(chosen);
+            let (length, next) = as_far_as_laws_go(newton, control, state, &correction)?;
+            self.moves.took(&correction.increment, length);
+            (correction, length, next)
+        };
+        let taken = Iteration {
+            viscosity: share,
+            ..newton.took(&next, &correction.increment, length)
+        };
+        let halves = length >= 1.0 && next.balance.relative <= HALF * state.balance.relative;
+        self.halvings = if halves { self.halvings + 1 } else { 0 };
+        self.has_settled = length >= 1.0
+            && next.balance.relative <= newton.settings.force_tolerance
+            && self.is_near(&taken, newton.settings.displacement_tolerance);
+        newton.kept.contraction = f64::INFINITY;
+        Ok((taken, next))
+    }
+
+    /// Cosine of the angle between the last correction and this one; 0 without one.
+    fn cosine(&self, correction: &[f64]) -> f64 {
+        if self.last.len() != correction.len() {
+            return 0.0;
+        }
+        dot(&self.last, correction) / (norm(&self.last) * norm(correction))
+    }
+
+    /// Whether corrections to come will add up to no more than this share of the increment.
+    fn is_near(&self, taken: &Iteration, tolerance: f64) -> bool {
+        let Some([first, _, last]) = self.sizes.last_chunk::<3>() else {
+            return false;
+        };
+        let rate = (last / first).sqrt();
+        let left = (rate / (1.0 - rate)).max(1.0);
+        rate < 1.0
+            && taken
+                .correction
+                .is_some_and(|size| left * size <= tolerance)
+    }
+}
+
+/// Least residual of iterations.
+fn least(part: &[Iteration]) -> f64 {
+    part.iter()
+        .fold(f64::INFINITY, |least, i| least.min(i.residual))
+}
+
+/// The largest length of a correction that the laws can follow, at most 1, and where it leads.
+fn as_far_as_laws_go(
+    newton: &mut Newton<'_>,
+    control: &impl Control,
+    state: &State,
+    correction: &Correction,
+) -> Result<(f64, State), StepFailure> {
+    let mut length = 1.0;
+    loop {
+        let at = state.moved_by(length, correction);
+        match control.evaluate(newton, at, Operator::Consistent) {
+            Err(failure) if failure.is_stop() || length < 0.1 => return Err(failure),
+            Err(_) => length *= 0.5,
+            Ok(next) => return Ok((length, next)),
+        }
+    }
+}
+
+/// As many times an even correction as the residual stays where it is, and where that leads.
+fn far_along(
+    newton: &mut Newton<'_>,
+    control: &impl Control,
+    state: &State,
+    correction: &Correction,
+) -> Result<(f64, State), StepFailure> {
+    let longest = LONGEST * norm(&state.increment) / norm(&correction.increment);
+    let allowed = (RISE * state.balance.relative).max(newton.settings.force_tolerance);
+    let mut length = 1.0;
+    while GROWTH * length <= longest {
+        let at = state.moved_by(GROWTH * length, correction);
+        match control.evaluate(newton, at, Operator::None) {
+            Err(failure) if failure.is_stop() => return Err(failure),
+            Ok(next) if next.balance.relative <= allowed => length *= GROWTH,
+            _ => break,
+        }
+    }
+    let at = state.moved_by(length, correction);
+    let next = control.evaluate(newton, at, Operator::Consistent)?;
+    Ok((length, next))
+}
