@@ -118,7 +118,7 @@ impl ContinuumLaw for HardeningSoilSmall {
             ..Increment::of(strain)
         };
         if tangent == Tangent::Consistent {
-            self.slopes(&memory, &mut increment);
+            self.slopes(&memory, &now, &mut increment);
         }
         let (end, derivative) =
             self.soil
@@ -138,22 +138,34 @@ impl ContinuumLaw for HardeningSoilSmall {
 }
 
 impl HardeningSoilSmall {
-    /// Derivatives of the moduli by the strain increment, by differences.
-    fn slopes<const N: usize>(&self, memory: &Memory<N>, increment: &mut Increment<N>) {
+    /// Derivatives of the moduli by the strain increment, by differences; beside a jump those of this side. Where the
+    /// direction of the increment alone changes the modulus by more than itself, less.
+    fn slopes<const N: usize>(
+        &self,
+        memory: &Memory<N>,
+        now: &Remembered<N>,
+        increment: &mut Increment<N>,
+    ) {
         const STEP: f64 = 6e-6;
         let size = increment.strain.iter().fold(0.0_f64, |x, e| x.max(e.abs()));
         if size <= 0.0 {
             return;
         }
+        let step = STEP * size;
         for j in 0..N {
             let moved = |by: f64| -> Remembered<N> {
                 let mut strain = increment.strain;
                 strain[j] += by;
                 self.small.remember(memory, &strain)
             };
-            let (above, below) = (moved(STEP * size), moved(-STEP * size));
-            increment.stiffening_slope[j] = (above.mean - below.mean) / (2.0 * STEP * size);
-            increment.slowing_slope[j] = (above.slowing - below.slowing) / (2.0 * STEP * size);
+            let (above, below) = (moved(step), moved(-step));
+            let slope = |of: fn(&Remembered<N>) -> f64| {
+                let sides = [of(&above) - of(now), of(now) - of(&below)];
+                let most = of(now) / size;
+                (one_sided(sides) / step).clamp(-most, most)
+            };
+            increment.stiffening_slope[j] = slope(|r| r.mean);
+            increment.slowing_slope[j] = slope(|r| r.slowing);
         }
     }
 
@@ -173,5 +185,17 @@ impl HardeningSoilSmall {
             cap_ratio: self.soil.cap.M,
             cap_modulus: self.soil.cap.H,
         }
+    }
+}
+
+/// The mean of differences to both sides, or the smaller one if there is a jump on the other side.
+fn one_sided([above, below]: [f64; 2]) -> f64 {
+    const ALIKE: f64 = 0.1;
+    if (above - below).abs() <= ALIKE * above.abs().max(below.abs()) {
+        0.5 * (above + below)
+    } else if above.abs() < below.abs() {
+        above
+    } else {
+        below
     }
 }
