@@ -138,8 +138,8 @@ impl ContinuumLaw for HardeningSoilSmall {
 }
 
 impl HardeningSoilSmall {
-    /// Derivatives of the moduli by the strain increment, by differences; beside a jump those of this side. Where the
-    /// direction of the increment alone changes the modulus by more than itself, less.
+    /// Derivatives of the moduli by the strain increment, by differences; beside a jump those of this side. They
+    /// are bounded, as the direction of a small increment may change the modulus ever faster.
     fn slopes<const N: usize>(
         &self,
         memory: &Memory<N>,
@@ -161,7 +161,7 @@ impl HardeningSoilSmall {
             let (above, below) = (moved(step), moved(-step));
             let slope = |of: fn(&Remembered<N>) -> f64| {
                 let sides = [of(&above) - of(now), of(now) - of(&below)];
-                let most = of(now) / size;
+                let most = 1e3 * of(now) / size;
                 (one_sided(sides) / step).clamp(-most, most)
             };
             increment.stiffening_slope[j] = slope(|r| r.mean);
