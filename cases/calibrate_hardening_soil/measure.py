@@ -16,7 +16,7 @@ sys.path.insert(0, str(here / "../../models/hardening_soil/src/tests"))
 import reference  # noqa: E402
 
 TRUTH = dict(e50=37e3, eoed=29.6e3, eur=90e3, m=0.5, nu=0.2, c=0.0, phi=41.0, psi=14.0, pref=100.0, k0=0.34, rf=0.9)
-STEPS = 1000
+STEPS = 10_000
 noise = random.Random(1999)
 soil = reference.Soil(TRUTH)
 

@@ -1,4 +1,4 @@
-"""Writes closed_forms.csv, the points that the figures of this case show: `python3 closed_forms.py`.
+"""Writes the points that the figures of this case show: `python3 closed_forms.py`.
 
 Drained triaxial compression with the cap out of reach: the hyperbola as long as nothing dilates, and beyond it the
 axial strain less half the integral of sin psi_m over gamma_ps, by Simpson's rule. Oedometer: integrals of 1/E_oed on
@@ -60,8 +60,13 @@ for s3 in (50.0, 100.0, 300.0):
     shear.append((0.08, s3 + q_f))
 oedometer = [(primary(s), s) for s in (50.0, 80.0, 110.0, 140.0, 170.0, 200.0, 250.0, 300.0, 350.0, 400.0)]
 oedometer += [(unloaded(s), s) for s in (80.0, 110.0, 140.0, 170.0)]
-with (Path(__file__).parent / "closed_forms.csv").open("w") as file:
-    file.write("axial strain,axial stress,oedometer strain,oedometer stress\n")
-    for i, (e, s) in enumerate(shear):
-        rest = f"{-oedometer[i][0]:.6e},{-oedometer[i][1]:.2f}" if i < len(oedometer) else ","
-        file.write(f"{-e:.6e},{-s:.4f},{rest}\n")
+
+def write(name, rows):
+    with (Path(__file__).parent / name).open("w") as file:
+        file.write("axial strain,axial stress\n")
+        for strain, stress in rows:
+            file.write(f"{-strain:.6e},{-stress:.4f}\n")
+
+
+write("closed_triaxial.csv", shear)
+write("closed_oedometer.csv", oedometer)
