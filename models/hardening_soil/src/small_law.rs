@@ -5,8 +5,8 @@ use crate::soil::{Soil, SoilParameters};
 use crate::spectral::Principal;
 use crate::step::{Increment, Point};
 use abi::{
-    ContinuumLaw, Description, Failure, Parameter, Refusal, SolidPoint, SolidResponse, Tangent,
-    Variable,
+    ContinuumLaw, Description, Failure, HasTangent, Parameter, Refusal, SolidPoint, SolidResponse,
+    Tangent, Variable,
 };
 use std::array;
 
@@ -67,6 +67,8 @@ impl ContinuumLaw for HardeningSoilSmall {
     };
     type Parameters = SmallParameters;
     type State = SmallState;
+    /// Where equal strains part, the axes of Eq. (25) turn ever faster, and there is no derivative.
+    const TANGENT: HasTangent = HasTangent::Approximate;
 
     fn new(p: SmallParameters) -> Result<Self, Refusal> {
         let soil = Soil::new(&p.soil)?;
