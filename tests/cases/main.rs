@@ -12,6 +12,7 @@ mod chamber_loading;
 mod chamber_mesh;
 mod chamber_soil_law;
 mod ground;
+mod hardening_soil;
 mod joint_laws;
 mod piles;
 mod shear_box;

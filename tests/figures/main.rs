@@ -60,6 +60,41 @@ const COMMITTED: &[Committed] = &[
         "*",
         &["loads", "axial_force"],
     ),
+    ("hardening_piles/bored.toml", "", "*", &["bored_loads"]),
+    (
+        "hardening_piles/textbook.toml",
+        "",
+        "*",
+        &["textbook_loads"],
+    ),
+    (
+        "hardening_piles/measured.toml",
+        "",
+        "*",
+        &["load_settlement"],
+    ),
+    ("hardening_soil_tests/triaxial.toml", "", "*", &["triaxial"]),
+    (
+        "hardening_soil_tests/oedometer.toml",
+        "",
+        "*",
+        &["oedometer"],
+    ),
+    (
+        "hardening_soil_tests/undrained.toml",
+        "",
+        "*",
+        &["undrained"],
+    ),
+    (
+        "calibrate_hardening_soil/calibration.toml",
+        "",
+        "*",
+        &[
+            "fit_stress_22_over_strain_22",
+            "fit_strain_11_over_strain_22",
+        ],
+    ),
     ("tension_pile/case.toml", "", "*", &["loads", "axial_force"]),
     (
         "cyclic_head_load/case.toml",

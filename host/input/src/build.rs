@@ -1,5 +1,6 @@
 //! From a case file to a problem in memory and the results that are wanted of it.
 
+mod consolidation;
 mod followed;
 mod law_shelf;
 mod phases;

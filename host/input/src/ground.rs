@@ -141,10 +141,10 @@ pub struct StressInput {
     /// At rest, instead of `k_0`: angle of friction, degrees.
     #[schemars(with = "Option<ProfileInput>")]
     pub friction_angle: Option<Spanned<ProfileInput>>,
-    /// At rest: overconsolidation ratio; default 1.
+    /// At rest: overconsolidation ratio; default 1. Also `ocr` of the group's law, if that has one.
     #[schemars(with = "Option<ProfileInput>")]
     pub ocr: Option<Spanned<ProfileInput>>,
-    /// At rest: pre-overburden pressure, kPa; default 0.
+    /// At rest: pre-overburden pressure, kPa; default 0. Also `pop` of the group's law, if that has one.
     #[schemars(with = "Option<ProfileInput>")]
     pub pop: Option<Spanned<ProfileInput>>,
     /// At rest: Poisson's ratio of unloading, needed with `ocr` or `pop`.

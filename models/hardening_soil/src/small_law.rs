@@ -5,8 +5,8 @@ use crate::soil::{Soil, SoilParameters};
 use crate::spectral::Principal;
 use crate::step::{Increment, Point};
 use abi::{
-    ContinuumLaw, Description, Failure, Parameter, Refusal, SolidPoint, SolidResponse, Tangent,
-    Variable,
+    ContinuumLaw, Description, Failure, HasTangent, Parameter, Refusal, SolidPoint, SolidResponse,
+    Tangent, Variable,
 };
 use std::array;
 
@@ -67,6 +67,8 @@ impl ContinuumLaw for HardeningSoilSmall {
     };
     type Parameters = SmallParameters;
     type State = SmallState;
+    /// Where equal strains part, the axes of Eq. (25) turn ever faster, and there is no derivative.
+    const TANGENT: HasTangent = HasTangent::Approximate;
 
     fn new(p: SmallParameters) -> Result<Self, Refusal> {
         let soil = Soil::new(&p.soil)?;
@@ -118,7 +120,7 @@ impl ContinuumLaw for HardeningSoilSmall {
             ..Increment::of(strain)
         };
         if tangent == Tangent::Consistent {
-            self.slopes(&memory, &mut increment);
+            self.slopes(&memory, &now, &mut increment);
         }
         let (end, derivative) =
             self.soil
@@ -138,22 +140,34 @@ impl ContinuumLaw for HardeningSoilSmall {
 }
 
 impl HardeningSoilSmall {
-    /// Derivatives of the moduli by the strain increment, by differences.
-    fn slopes<const N: usize>(&self, memory: &Memory<N>, increment: &mut Increment<N>) {
+    /// Derivatives of the moduli by the strain increment, by differences; beside a jump those of this side. They
+    /// are bounded, as the direction of a small increment may change the modulus ever faster.
+    fn slopes<const N: usize>(
+        &self,
+        memory: &Memory<N>,
+        now: &Remembered<N>,
+        increment: &mut Increment<N>,
+    ) {
         const STEP: f64 = 6e-6;
         let size = increment.strain.iter().fold(0.0_f64, |x, e| x.max(e.abs()));
         if size <= 0.0 {
             return;
         }
+        let step = STEP * size;
         for j in 0..N {
             let moved = |by: f64| -> Remembered<N> {
                 let mut strain = increment.strain;
                 strain[j] += by;
                 self.small.remember(memory, &strain)
             };
-            let (above, below) = (moved(STEP * size), moved(-STEP * size));
-            increment.stiffening_slope[j] = (above.mean - below.mean) / (2.0 * STEP * size);
-            increment.slowing_slope[j] = (above.slowing - below.slowing) / (2.0 * STEP * size);
+            let (above, below) = (moved(step), moved(-step));
+            let slope = |of: fn(&Remembered<N>) -> f64| {
+                let sides = [of(&above) - of(now), of(now) - of(&below)];
+                let most = 1e3 * of(now) / size;
+                (one_sided(sides) / step).clamp(-most, most)
+            };
+            increment.stiffening_slope[j] = slope(|r| r.mean);
+            increment.slowing_slope[j] = slope(|r| r.slowing);
         }
     }
 
@@ -173,5 +187,17 @@ impl HardeningSoilSmall {
             cap_ratio: self.soil.cap.M,
             cap_modulus: self.soil.cap.H,
         }
+    }
+}
+
+/// The mean of differences to both sides, or the smaller one if there is a jump on the other side.
+fn one_sided([above, below]: [f64; 2]) -> f64 {
+    const ALIKE: f64 = 0.1;
+    if (above - below).abs() <= ALIKE * above.abs().max(below.abs()) {
+        0.5 * (above + below)
+    } else if above.abs() < below.abs() {
+        above
+    } else {
+        below
     }
 }

@@ -252,7 +252,7 @@ impl LawShelf<'_> {
     }
 
     /// The law of a table, opened once.
-    fn kept(&self, law: &str, entry: &LawInput) -> Result<LoadedLaw, Error> {
+    pub(super) fn kept(&self, law: &str, entry: &LawInput) -> Result<LoadedLaw, Error> {
         if let Some(loaded) = self.opened.borrow().get(law) {
             return Ok(loaded.clone());
         }

@@ -79,7 +79,9 @@ impl<'a> LawShelf<'a> {
             });
         let hypothesis = model::hypothesis(self.file.analysis, group.formulation, is_interface_law);
         let key = (name.get_ref().clone(), hypothesis.name());
-        let (parameters, elements) = self.valued_in(number, name.get_ref(), entry)?;
+        let (mut parameters, elements) = self.valued_in(number, name.get_ref(), entry)?;
+        let handed = self.consolidation(group, name, entry, &parameters)?;
+        parameters.extend(handed.clone());
         let built = if let Some(built) = self.laws.get(&key) {
             Arc::clone(built)
         } else {
@@ -115,9 +117,17 @@ impl<'a> LawShelf<'a> {
         material.varying = if elements.is_empty() {
             self.varying(entry, hypothesis, &parameters)?
         } else {
-            let profiles = self.profiles(&self.tables().parameters(entry))?;
-            profiles.into_iter().chain(elements).collect()
+            let own = self.profiles(&self.tables().parameters(entry))?;
+            let profiles = own.into_iter().chain(self.profiles(&handed)?);
+            profiles.chain(elements).collect()
         };
+        // The law may have been built for another group.
+        for (id, value) in &handed {
+            if let ParameterValue::Number(number) = value.get_ref() {
+                let all = Variation::Height((*number).into());
+                material.varying.push((id.get_ref().clone(), all));
+            }
+        }
         let law = &material.built.law;
         for (variable, value) in &self.tables().initial(entry) {
             if !value.get_ref().is_finite() {

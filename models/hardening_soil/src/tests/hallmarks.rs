@@ -50,15 +50,56 @@ fn the_secant_at_half_the_strength_is_e_50() {
     }
 }
 
-/// The cap lowers the secant of a normally consolidated soil.
+/// Dense and loose Hostun sand, and the clay of a building pit, as the literature gives them.
+const HOSTUN_DENSE: SoilParameters = SoilParameters {
+    e_50_ref: 37e3,
+    e_oed_ref: 29.6e3,
+    m: 0.5,
+    nu_ur: 0.2,
+    friction_angle: 41.0,
+    dilatancy_angle: 14.0,
+    k_0_nc: 0.34,
+    ..DENSE
+};
+const HOSTUN_LOOSE: SoilParameters = SoilParameters {
+    e_50_ref: 20e3,
+    e_oed_ref: 16e3,
+    e_ur_ref: 60e3,
+    m: 0.65,
+    friction_angle: 34.0,
+    dilatancy_angle: 0.0,
+    k_0_nc: 0.44,
+    ..HOSTUN_DENSE
+};
+const PIT_CLAY: SoilParameters = SoilParameters {
+    e_50_ref: 4e3,
+    e_oed_ref: 3.3e3,
+    e_ur_ref: 12e3,
+    m: 1.0,
+    nu_ur: 0.15,
+    cohesion: 1.0,
+    friction_angle: 25.0,
+    dilatancy_angle: 0.0,
+    k_0_nc: 0.5774,
+    ..DENSE
+};
+
+/// The cap lowers the secant of a normally consolidated soil; the shares are those of an explicit integration of the
+/// rate equations that shares no code with the law.
 #[test]
 fn the_cap_lowers_the_secant_of_normal_consolidation() {
-    let law = law(DENSE);
-    let mut path = Path::new(&law, [100.0; 3]);
-    let q = 0.5 * strength(&DENSE, 100.0);
-    path.go([Stress(q), FREE, FREE], 100);
-    let share = q / path.strain[0] / DENSE.e_50_ref;
-    assert!(share > 0.6 && share < 0.95, "{share}");
+    for (p, expected) in [
+        (HOSTUN_DENSE, 0.8956),
+        (HOSTUN_LOOSE, 0.8199),
+        (PIT_CLAY, 0.7377),
+    ] {
+        let law = law(p);
+        let mut path = Path::new(&law, [100.0; 3]);
+        let q = 0.5 * strength(&p, 100.0);
+        path.go([Stress(q), FREE, FREE], 100);
+        let share = q / path.strain[0] / (p.e_50_ref * scale(&p, 100.0));
+        assert_relative_eq!(share, expected, epsilon = 1e-3);
+    }
 }
 
 #[test]

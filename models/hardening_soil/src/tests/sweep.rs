@@ -1,10 +1,11 @@
 //! Random paths from random initial states.
 
 use super::{CLAY, DENSE, Path, size_of};
-use crate::HardeningSoil;
-use crate::soil::SoilParameters;
+use crate::small_law::SmallParameters;
+use crate::soil::{Soil, SoilParameters};
 use crate::spectral::Principal;
-use abi::{ContinuumLaw as _, Tangent};
+use crate::{HardeningSoil, HardeningSoilSmall};
+use abi::{ContinuumLaw, Tangent};
 
 /// Uniform numbers in [0, 1): a 64-bit linear congruential generator (Knuth's constants).
 struct Random(u64);
@@ -23,12 +24,15 @@ impl Random {
     }
 }
 
-/// Six increments on two ways, from stresses with random overconsolidation. Every end is within the strength.
-#[test]
-fn random_paths_succeed() {
-    const PATHS: u32 = 10_000;
+/// Six increments on two ways, from stresses with random overconsolidation. Every end is within the strength, and
+/// no tangent is stiffer than elasticity times `stiffest`. Returns how often a law asked for a smaller increment.
+fn sweep<L: ContinuumLaw>(
+    paths: u32,
+    stiffest: f64,
+    new: impl Fn(SoilParameters) -> (L, Soil),
+) -> u32 {
     let (mut random, mut cuts) = (Random(1), 0);
-    for n in 0..PATHS {
+    for n in 0..paths {
         let base = if n % 2 == 0 { DENSE } else { CLAY };
         let p = SoilParameters {
             ocr: if n % 3 == 0 {
@@ -39,9 +43,7 @@ fn random_paths_succeed() {
             m: [0.0, 0.5, 0.7, 1.0][n as usize / 2 % 4],
             ..base
         };
-        let Ok(law) = HardeningSoil::new(p) else {
-            panic!("{n}: refused");
-        };
+        let (law, soil) = new(p);
         let s = 10_f64.powf(random.between(-1.0, 3.0));
         let k = random.between(0.4, 2.0);
         let third = s * random.between(k.min(1.0), k.max(1.0));
@@ -50,29 +52,78 @@ fn random_paths_succeed() {
             let size = 10_f64.powf(random.between(-5.0, -2.5));
             let increment: [f64; 6] = std::array::from_fn(|_| size * random.between(-1.0, 1.0));
             for _ in 0..3 {
-                follow(&mut path, &increment, 2, &mut cuts);
+                follow(&mut path, &increment, [2.0, stiffest], &mut cuts);
                 let values = Principal::of(&path.stress).values;
-                let (q, q_f) = (values[0] - values[2], law.soil.q_f(values[2]).0);
+                let (q, q_f) = (values[0] - values[2], soil.q_f(values[2]).0);
                 assert!(q <= q_f + 1e-9 * (values[0].abs() + 1.0), "{n}: {values:?}");
             }
         }
     }
+    cuts
+}
+
+#[test]
+fn random_paths_succeed() {
+    const PATHS: u32 = 10_000;
+    let cuts = sweep(PATHS, 10.0, |p| {
+        let law = HardeningSoil::new(p).unwrap();
+        let soil = law.soil;
+        (law, soil)
+    });
+    assert!(cuts < PATHS / 500, "{cuts} cuts");
+}
+
+/// The stiffness at small strains depends on the direction of the increment: of a small one it changes fast.
+#[test]
+fn random_paths_with_small_strains_succeed() {
+    const PATHS: u32 = 4_000;
+    let cuts = sweep(PATHS, 1e4, |soil| {
+        let parameters = SmallParameters {
+            soil,
+            g_0_ref: 1.3 * soil.e_ur_ref,
+            gamma_07: 1.5e-4,
+        };
+        let law = HardeningSoilSmall::new(parameters).unwrap();
+        let soil = law.soil;
+        (law, soil)
+    });
     assert!(cuts < PATHS / 500, "{cuts} cuts");
 }
 
 /// An increment, in halves where the law asks for it, as a host does.
-fn follow(path: &mut Path<'_, HardeningSoil>, increment: &[f64; 6], halvings: u32, cuts: &mut u32) {
+fn follow<L: ContinuumLaw>(
+    path: &mut Path<'_, L>,
+    increment: &[f64; 6],
+    [halvings, stiffest]: [f64; 2],
+    cuts: &mut u32,
+) {
     match path.try_update(increment, Tangent::Consistent) {
         Ok(end) => {
+            let elastic = |path: &Path<'_, L>| {
+                let zero = path.try_update(&[0.0; 6], Tangent::Elastic).unwrap();
+                size_of(&zero.tangent)
+            };
+            let before = (path.stress, elastic(path));
             path.accept(increment, &end);
-            assert!(size_of(&end.tangent).is_finite(), "{:?}", path.stress);
+            let stiffness = before.1.max(elastic(path));
+            let size = size_of(&end.tangent);
+            assert!(
+                size < stiffest * stiffness,
+                "{size:e} {stiffness:e} {:?} {increment:?} {:?}",
+                before.0,
+                path.stress
+            );
         }
         Err(failure) => {
             *cuts += 1;
-            assert!(halvings > 0, "{failure:?} {:?} {increment:?}", path.stress);
+            assert!(
+                halvings > 0.0,
+                "{failure:?} {:?} {increment:?}",
+                path.stress
+            );
             let half = increment.map(|e| 0.5 * e);
-            follow(path, &half, halvings - 1, cuts);
-            follow(path, &half, halvings - 1, cuts);
+            follow(path, &half, [halvings - 1.0, stiffest], cuts);
+            follow(path, &half, [halvings - 1.0, stiffest], cuts);
         }
     }
 }
