@@ -224,19 +224,13 @@ pub(crate) fn unstructured_grid(
         active,
     } = Cells::of(snapshot.groups);
     let points = reals(mesh.nodes.iter().flat_map(|[x, y]| [*x, *y, 0.0]));
-    let u = reals(
-        snapshot
-            .displacement
-            .chunks_exact(2)
-            .flat_map(|u| [u[0], u[1], 0.0]),
-    );
+    let pairs = snapshot.displacement.chunks_exact(2);
+    let u = reals(pairs.flat_map(|u| [u[0], u[1], 0.0]));
     let connectivity = list(&connectivity);
     let mut cells = String::new();
     let of_mesh = has_mesh_error.then(|| mesh_error(snapshot));
-    for (name, values) in cell_data(snapshot, has_pressures)
-        .into_iter()
-        .chain(of_mesh)
-    {
+    let data = cell_data(snapshot, has_pressures);
+    for (name, values) in data.into_iter().chain(of_mesh) {
         let values = reals(values.into_iter());
         let _ = writeln!(
             cells,

@@ -186,9 +186,8 @@ impl Probe {
                 scale,
             } => {
                 active(snapshot, *group)?;
-                let values = points
-                    .iter()
-                    .map(|&point| quantity.at(snapshot, *group, point));
+                let of = |&point: &usize| quantity.at(snapshot, *group, point);
+                let values = points.iter().map(of);
                 reduced(*reduce, values, weights).map(|value| scale * value)
             }
             Self::Displacement {
@@ -197,9 +196,8 @@ impl Probe {
                 reduce,
                 scale,
             } => {
-                let values = nodes
-                    .iter()
-                    .map(|&n| Some(snapshot.displacement[2 * n + component]));
+                let of = |&n: &usize| Some(snapshot.displacement[2 * n + component]);
+                let values = nodes.iter().map(of);
                 reduced(*reduce, values, &[]).map(|value| scale * value)
             }
             Self::Force {

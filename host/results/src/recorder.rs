@@ -428,8 +428,9 @@ impl Recorder {
         self.begins(&place.phase, snapshot);
         let (probes, pile) = self.values(place, snapshot)?;
         let start = Instant::now();
-        let row = history_row(place, *time, &probes, increment.iterations);
-        self.history.row(row);
+        let iterations = increment.iterations;
+        self.history
+            .row(history_row(place, *time, &probes, iterations));
         self.history.flush()?;
         if self.settings.profile.includes(place.increment, *of)
             && let Some(profile) = &mut self.profile

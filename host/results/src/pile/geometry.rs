@@ -120,16 +120,7 @@ impl Geometry {
         let problem = simulation.problem();
         let (mesh, groups) = (&problem.mesh, simulation.groups());
         let (own, by_side) = elements(parts, groups)?;
-        let of_line = |line: &Line| -> Vec<usize> {
-            let places: HashSet<[u64; 2]> = line.nodes.iter().map(|&n| place(mesh, n)).collect();
-            let mut nodes: Vec<usize> = own
-                .iter()
-                .copied()
-                .filter(|&node| places.contains(&place(mesh, node)))
-                .collect();
-            nodes.sort_unstable();
-            nodes
-        };
+        let of_line = |line: &Line| at_line(mesh, line, &own);
         let line = |name: &str| mesh.lines.get(name);
         let head = line(&parts.head).map(of_line).unwrap_or_default();
         if head.is_empty() {
@@ -137,13 +128,8 @@ impl Geometry {
         }
         let facets = |of: &[usize]| facets(problem.analysis, mesh, groups, of, &own, &by_side);
         let shaft = shaft(parts, groups, facets)?;
-        let base = base(
-            parts,
-            groups,
-            |name| line(name).map(of_line),
-            facets,
-            &by_side,
-        )?;
+        let at = |name: &str| line(name).map(of_line);
+        let base = base(parts, groups, at, facets, &by_side)?;
         if base.is_empty() {
             return Err(Misfit::Base);
         }
@@ -153,12 +139,9 @@ impl Geometry {
         }
         let spans = Span::all([top, bottom], &shaft, problem);
         let rows = rows(mesh, &spans, &shaft, [&head, &base]);
-        let special: HashSet<usize> = shaft
-            .iter()
-            .flat_map(|facet| facet.nodes)
-            .chain(head.iter().copied())
-            .chain(base.iter().copied())
-            .collect();
+        let special = shaft.iter().flat_map(|facet| facet.nodes);
+        let special = special.chain(head.iter().chain(&base).copied());
+        let special: HashSet<usize> = special.collect();
         let mut others: Vec<usize> = own.difference(&special).copied().collect();
         others.sort_unstable();
         let [left, right] = extent(mesh, &base, 0);
@@ -346,6 +329,16 @@ fn elements(parts: &Parts, groups: &[Group]) -> Result<Elements, Misfit> {
         }
     }
     Ok((own, by_side))
+}
+
+/// Nodes of the pile at a line.
+fn at_line(mesh: &Mesh, line: &Line, own: &HashSet<usize>) -> Vec<usize> {
+    let places: HashSet<[u64; 2]> = line.nodes.iter().map(|&n| place(mesh, n)).collect();
+    let there = own.iter().copied();
+    let there = there.filter(|&node| places.contains(&place(mesh, node)));
+    let mut nodes: Vec<usize> = there.collect();
+    nodes.sort_unstable();
+    nodes
 }
 
 /// What touches the pile of the interfaces along its shaft.

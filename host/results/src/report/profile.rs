@@ -339,10 +339,9 @@ impl Profile {
         }
         let shown = blocks.shown(most / size.max(1));
         if shown.len() < blocks.n {
+            let (all, shown) = (blocks.n, shown.len());
             notes.push(format!(
-                "of {} profiles {} are shown; profile.csv has all",
-                blocks.n,
-                shown.len()
+                "of {all} profiles {shown} are shown; profile.csv has all"
             ));
         }
         let shown: Vec<&Block> = shown.iter().map(|&i| &blocks.kept[i]).collect();

@@ -240,8 +240,7 @@ fn curves(histories: &[History]) -> (Curves, Option<usize>) {
     let drawn = drawn.filter(|(_, history)| !history.phases.is_empty());
     let n_runs = drawn.clone().count();
     let most = (MOST_NUMBERS / (n_runs * (names.len() + 1)).max(1)).max(8);
-    let lengths = histories.iter().map(|history| history.phases.len());
-    let longest = lengths.max().unwrap_or(0);
+    let longest = histories.iter().map(|h| h.phases.len()).max().unwrap_or(0);
     let curve = |(run, history): (usize, &History)| {
         let of = &history.phases;
         // The last row of a phase is where it ends.
