@@ -155,6 +155,12 @@ fn a_neutral_plane_is_where_a_hand_calculation_has_it() {
     assert_close(drag(neutral), by_hand, 0.06, "neutral plane");
     let dragload = floating.end(phase, "pile_dragload");
     assert_close(dragload, by_hand, 0.15, "dragload");
+    // The head passes 0.1 D under its dead load: ground that settles is no load test.
+    let pile = &floating.summary["pile"];
+    assert!(floating.end(phase, "pile_settlement") > 0.05);
+    assert!(pile["resistance_10_percent_diameter"].is_null(), "{pile}");
+    let why = &pile["resistance_10_percent_diameter_reason"];
+    assert!(why.as_str().unwrap().contains("no load test"), "{why}");
 }
 
 #[test]

@@ -169,3 +169,60 @@ fn refuses_expressions_that_have_no_value() {
         ],
     );
 }
+
+/// Two blocks on a joint that has a tenth of their cohesion and slides.
+const BLOCKS: &str = r#"analysis = "plane_strain"
+[mesh]
+columns = [{ n = 1, to = 1.0 }]
+rows = [{ n = 1, to = 0.5 }, { n = 1, to = 1.0 }]
+lines = { bottom = { y = 0.0 }, joint = { y = 0.5 }, top = { y = 1.0 } }
+region = [{ group = "blocks" }]
+[laws]
+block = { law = "mohr_coulomb", parameters = { young_modulus = 1e7, poisson_ratio = 0.2, cohesion = 100.0, friction_angle = 30.0, dilatancy_angle = 0.0 } }
+joint = { law = "coulomb_joint", parameters = { normal_stiffness = 1e6, shear_stiffness = 1e5, cohesion = "= 0.1 * block.cohesion", friction_angle = 0.0, dilatancy_angle = 0.0 } }
+[groups]
+blocks = { formulation = "solid", law = "block" }
+joint = { formulation = "zero_thickness", line = "joint", law = "joint" }
+[[supports]]
+line = "bottom"
+fixed = ["x", "y"]
+[[phase]]
+name = "weight"
+increments = 1
+pressure = [{ line = "top", value = 100.0 }]
+[[phase]]
+name = "push"
+increments = 5
+displacement = [{ line = "top", x = 1e-3 }]
+[probes]
+tau = { group = "joint", quantity = "traction_t" }
+u = { line = "top", quantity = "displacement_x" }
+"#;
+
+#[test]
+fn what_follows_is_varied_by_studies_and_found_by_calibrations() {
+    let place = Place::new();
+    place.write("case.toml", BLOCKS);
+    let study = "title = \"cohesion\"\ncase = \"case.toml\"\nmethod = \"list\"\n\
+         [[parameter]]\nkey = \"laws.block.parameters.cohesion\"\nvalues = [100.0, 200.0]\n\
+         [outputs]\ntau = { probe = \"tau\" }\n";
+    place.write("study.toml", study);
+    let outcome = place.run(&["study", "study.toml", "--out", "study"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let runs = std::fs::read_to_string(place.path("study/runs.csv")).unwrap();
+    let tau = runs.lines().skip(1).map(|line| line.split(',').nth(3));
+    let tau: Vec<f64> = tau.map(|tau| tau.unwrap().parse().unwrap()).collect();
+    for (tau, tenth) in tau.iter().zip([10.0, 20.0]) {
+        assert!((tau - tenth).abs() < 1e-9, "{runs}");
+    }
+    // A joint that slides at 14.5 kPa.
+    place.write("measured.csv", "u,tau\n2e-4,14.5\n6e-4,14.5\n1e-3,14.5\n");
+    let calibration = "title = \"cohesion\"\n[free]\ncohesion = { laws = [\"block\"], min = 50.0, max = 300.0 }\n\
+         [[test]]\nname = \"push\"\ncase = \"case.toml\"\n[[test.curve]]\nx = \"u\"\ny = \"tau\"\nphase = \"push\"\n\
+         measured = { file = \"measured.csv\", x = \"u\", y = \"tau\" }\nnoise = 0.1\n";
+    place.write("calibration.toml", calibration);
+    let outcome = place.run(&["calibrate", "calibration.toml", "--out", "found"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let found = outcome.stdout;
+    assert!(found.contains("cohesion = 145.0\n"), "{found}");
+}

@@ -528,4 +528,11 @@ fn water_below_the_mesh_and_above_the_ground_is_said() {
             .any(|said| said.contains("lies above the highest ground at 2 m")),
         "{said:?}"
     );
+    // One unit weight on both sides of the table.
+    let one = text("1.5").replace("saturated_unit_weight = 20.0, ", "");
+    let (said, _) = run(&one, "s_low");
+    for group in ["`lower` lies below", "`upper` crosses"] {
+        let says = |said: &String| said.contains(group) && said.contains("`unit_weight` 18");
+        assert!(said.iter().any(says), "{group}: {said:?}");
+    }
 }

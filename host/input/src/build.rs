@@ -115,24 +115,7 @@ impl Case {
         let mut groups = Vec::new();
         for (number, (name, group)) in file.groups.iter().enumerate() {
             let input = group.get_ref();
-            shelf.entry(&input.law)?;
-            // A law that the first phase replaces is never used, and not loaded.
-            let mut own = None;
-            for (phase, into) in file.phases.iter().zip(&mut phases) {
-                let mut laws = phase.laws.iter();
-                let swap = laws.find(|(key, _)| key.get_ref() == name.get_ref());
-                if let Some((_, law)) = swap {
-                    let material = shelf.material(number, name, input, law)?;
-                    own.get_or_insert_with(|| material.clone());
-                    into.materials.push((number, material));
-                } else if own.is_none() {
-                    own = Some(shelf.material(number, name, input, &input.law)?);
-                }
-            }
-            let material = match own {
-                Some(material) => material,
-                None => shelf.material(number, name, input, &input.law)?,
-            };
+            let material = materials(&mut shelf, (number, name, input), &mut phases)?;
             let ground = shelf.ground[number].clone();
             groups.push(element_group(name, input, ground, material));
         }
@@ -438,6 +421,67 @@ fn refuse_unknown_groups(source: &Source, file: &CaseFile) -> Result<(), Error> 
     Ok(())
 }
 
+/// The material that a group begins with. Those that phases swap in go into the phases.
+fn materials(
+    shelf: &mut LawShelf<'_>,
+    (number, name, input): (usize, &Spanned<String>, &GroupInput),
+    phases: &mut [Phase],
+) -> Result<Material, Error> {
+    shelf.entry(&input.law)?;
+    // A law that the first phase replaces is never used, and not loaded.
+    let mut own = None;
+    for (phase, into) in shelf.file.phases.iter().zip(phases) {
+        let mut laws = phase.laws.iter();
+        let swap = laws.find(|(key, _)| key.get_ref() == name.get_ref());
+        if let Some((_, law)) = swap {
+            let material = shelf.material(number, name, input, law)?;
+            own.get_or_insert_with(|| material.clone());
+            into.materials.push((number, material));
+        } else if own.is_none() {
+            own = Some(shelf.material(number, name, input, &input.law)?);
+        }
+    }
+    match own {
+        Some(material) => Ok(material),
+        None => shelf.material(number, name, input, &input.law),
+    }
+}
+
+/// A water table below the mesh, or above the ground.
+fn water_level(
+    source: &Source,
+    written: &Spanned<LevelInput>,
+    mesh: &Mesh,
+    is_ground: impl Fn(usize) -> bool,
+) -> Result<Option<String>, Error> {
+    let highest = level(source, written)?
+        .values()
+        .fold(f64::NEG_INFINITY, f64::max);
+    let (mut lowest, mut top) = (f64::INFINITY, f64::NEG_INFINITY);
+    for solid in &mesh.solids {
+        let is_ground = is_ground(solid.group);
+        for &node in solid.nodes() {
+            let at = mesh.nodes[node][1];
+            lowest = lowest.min(at);
+            top = if is_ground { top.max(at) } else { top };
+        }
+    }
+    let place = source.place(&written.span());
+    Ok(if highest < lowest {
+        Some(format!(
+            "{place}: the water table, {highest} m at its highest, lies below the lowest point of the mesh at {lowest} m: \
+             the ground is dry"
+        ))
+    } else if highest > top + ABOVE * (top - lowest) && top.is_finite() {
+        Some(format!(
+            "{place}: the water table, {highest} m at its highest, lies above the highest ground at {top} m: free water \
+             loads its surface"
+        ))
+    } else {
+        None
+    })
+}
+
 /// Water tables below the mesh, and above the ground.
 fn water_levels(
     source: &Source,
@@ -453,32 +497,8 @@ fn water_levels(
     let first = phases.first();
     let mut notes = Vec::new();
     let mut note = |written: &Spanned<LevelInput>, active: &[bool]| -> Result<(), Error> {
-        let highest = level(source, written)?
-            .values()
-            .fold(f64::NEG_INFINITY, f64::max);
-        let heights = mesh.solids.iter().flat_map(|solid| {
-            let is_ground = active[solid.group] && is_wet[solid.group];
-            let nodes = solid.nodes().iter();
-            nodes.map(move |&node| (mesh.nodes[node][1], is_ground))
-        });
-        let (lowest, top) = heights.fold(
-            (f64::INFINITY, f64::NEG_INFINITY),
-            |(lowest, top), (at, is_ground)| {
-                (lowest.min(at), if is_ground { top.max(at) } else { top })
-            },
-        );
-        let place = source.place(&written.span());
-        if highest < lowest {
-            notes.push(format!(
-                "{place}: the water table, {highest} m at its highest, lies below the lowest point of the mesh at {lowest} m: \
-                 the ground is dry"
-            ));
-        } else if highest > top + ABOVE * (top - lowest) && top.is_finite() {
-            notes.push(format!(
-                "{place}: the water table, {highest} m at its highest, lies above the highest ground at {top} m: free water \
-                 loads its surface"
-            ));
-        }
+        let is_ground = |group: usize| active[group] && is_wet[group];
+        notes.extend(water_level(source, written, mesh, is_ground)?);
         Ok(())
     };
     if let Some(water) = &file.water {

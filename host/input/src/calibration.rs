@@ -324,20 +324,7 @@ impl Calibration {
     /// What can be reported of the file without any other.
     fn check(&self) -> Result<(), Error> {
         let file = &self.file;
-        let above = |value: &Spanned<f64>, key: &str, most: f64| {
-            let number = *value.get_ref();
-            if number > 0.0 && number < most {
-                return Ok(());
-            }
-            let end = if most.is_finite() {
-                format!(" and below {most}")
-            } else {
-                String::new()
-            };
-            let message = format!("`{key}` is {number}, expected a number above 0{end}");
-            Err(self.error(value.span(), message))
-        };
-        above(&file.confidence, "confidence", 1.0)?;
+        self.check_above(&file.confidence, "confidence", 1.0)?;
         if let Some(step) = &file.difference
             && !(*step.get_ref() > 0.0 && *step.get_ref() <= 0.1)
         {
@@ -367,31 +354,49 @@ impl Calibration {
             return Err(self.error(0..0, message));
         }
         for test in &file.test {
-            match (&test.driver, &test.case) {
-                (Some(_), None) | (None, Some(_)) => {}
-                (Some(_), Some(case)) => {
-                    let message = "a test has a `driver` or a `case`, not both";
-                    return Err(self.error(case.span(), message));
-                }
-                (None, None) => {
-                    let message = format!(
-                        "test `{}` needs a `driver` or a `case`",
-                        test.name.get_ref()
-                    );
-                    return Err(self.error(test.name.span(), message));
-                }
-            }
-            above(&test.weight, "weight", f64::INFINITY)?;
-            if test.curve.is_empty() {
-                let message = format!("test `{}` needs a [[test.curve]]", test.name.get_ref());
-                return Err(self.error(test.name.span(), message));
-            }
-            for curve in &test.curve {
-                above(&curve.weight, "weight", f64::INFINITY)?;
-                self.check_curve(test, curve)?;
-            }
+            self.check_test(test)?;
         }
         self.check_stages()
+    }
+
+    /// A number above 0 and below another.
+    fn check_above(&self, value: &Spanned<f64>, key: &str, most: f64) -> Result<(), Error> {
+        let number = *value.get_ref();
+        if number > 0.0 && number < most {
+            return Ok(());
+        }
+        let end = if most.is_finite() {
+            format!(" and below {most}")
+        } else {
+            String::new()
+        };
+        let message = format!("`{key}` is {number}, expected a number above 0{end}");
+        Err(self.error(value.span(), message))
+    }
+
+    fn check_test(&self, test: &TestInput) -> Result<(), Error> {
+        let name = test.name.get_ref();
+        match (&test.driver, &test.case) {
+            (Some(_), None) | (None, Some(_)) => {}
+            (Some(_), Some(case)) => {
+                let message = "a test has a `driver` or a `case`, not both";
+                return Err(self.error(case.span(), message));
+            }
+            (None, None) => {
+                let message = format!("test `{name}` needs a `driver` or a `case`");
+                return Err(self.error(test.name.span(), message));
+            }
+        }
+        self.check_above(&test.weight, "weight", f64::INFINITY)?;
+        if test.curve.is_empty() {
+            let message = format!("test `{name}` needs a [[test.curve]]");
+            return Err(self.error(test.name.span(), message));
+        }
+        for curve in &test.curve {
+            self.check_above(&curve.weight, "weight", f64::INFINITY)?;
+            self.check_curve(test, curve)?;
+        }
+        Ok(())
     }
 
     fn check_names<'s>(
@@ -451,41 +456,41 @@ impl Calibration {
         Ok(())
     }
 
-    fn check_stages(&self) -> Result<(), Error> {
+    /// Names in a stage.
+    fn check_stage(&self, stage: &StageInput) -> Result<(), Error> {
         let file = &self.file;
         let free: Vec<&str> = file.free.keys().map(|key| key.get_ref().as_str()).collect();
-        let tests: Vec<&str> = file
-            .test
-            .iter()
-            .map(|test| test.name.get_ref().as_str())
-            .collect();
+        let tests = file.test.iter().map(|test| test.name.get_ref().as_str());
         let unknown = |kind: &str, name: &Spanned<String>, known: &[&str]| {
             Error::from(self.source.unknown(kind, name, known.iter().copied()))
         };
+        if stage.free.is_empty() {
+            let message = format!("stage `{}` has no free parameter", stage.name.get_ref());
+            return Err(self.error(stage.name.span(), message));
+        }
+        for name in &stage.free {
+            if !free.contains(&name.get_ref().as_str()) {
+                return Err(unknown("free parameter", name, &free));
+            }
+        }
+        for name in &stage.tests {
+            let mut all = file.test.iter();
+            match all.find(|test| test.name.get_ref() == name.get_ref()) {
+                None => return Err(unknown("test", name, &tests.collect::<Vec<_>>())),
+                Some(test) if test.predict => {
+                    let message = format!("test `{}` is predicted, not fitted", name.get_ref());
+                    return Err(self.error(name.span(), message));
+                }
+                Some(_) => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn check_stages(&self) -> Result<(), Error> {
+        let file = &self.file;
         for stage in &file.stage {
-            if stage.free.is_empty() {
-                let message = format!("stage `{}` has no free parameter", stage.name.get_ref());
-                return Err(self.error(stage.name.span(), message));
-            }
-            for name in &stage.free {
-                if !free.contains(&name.get_ref().as_str()) {
-                    return Err(unknown("free parameter", name, &free));
-                }
-            }
-            for name in &stage.tests {
-                let test = file
-                    .test
-                    .iter()
-                    .find(|test| test.name.get_ref() == name.get_ref());
-                match test {
-                    None => return Err(unknown("test", name, &tests)),
-                    Some(test) if test.predict => {
-                        let message = format!("test `{}` is predicted, not fitted", name.get_ref());
-                        return Err(self.error(name.span(), message));
-                    }
-                    Some(_) => {}
-                }
-            }
+            self.check_stage(stage)?;
         }
         if file.stage.is_empty() {
             return Ok(());

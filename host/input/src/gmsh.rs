@@ -37,6 +37,20 @@ struct Wanted<'c> {
 /// Meaning of the names of one kind in a file.
 type Counts = IndexMap<String, usize>;
 
+fn refuse_divided_layers(source: &Source, file: &CaseFile) -> Result<(), Error> {
+    let mut groups = file.groups.iter();
+    let layer = groups.find(|(_, group)| group.get_ref().formulation == Formulation::ThinLayer);
+    let Some((name, _)) = layer else {
+        return Ok(());
+    };
+    let message = format!(
+        "group `{}` is a thin layer, whose thickness is that of its elements: a mesh from a file is \
+         not divided across it",
+        name.get_ref()
+    );
+    Err(source.error(name.span(), message).into())
+}
+
 /// The mesh of a case that names a file, divided as often as the case says, with notes for the user.
 ///
 /// # Errors
@@ -48,16 +62,8 @@ pub(crate) fn mesh(
     written: &Spanned<PathBuf>,
 ) -> Result<(Mesh, MeshFile), Error> {
     let input = &file.mesh;
-    if let Some(region) = file.groups.iter().find(|(_, group)| {
-        let group = group.get_ref();
-        input.divisions > 0 && group.formulation == Formulation::ThinLayer
-    }) {
-        let message = format!(
-            "group `{}` is a thin layer, whose thickness is that of its elements: a mesh from a file \
-             is not divided across it",
-            region.0.get_ref()
-        );
-        return Err(source.error(region.0.span(), message).into());
+    if input.divisions > 0 {
+        refuse_divided_layers(source, file)?;
     }
     let scale = input.scale.as_ref().map_or(1.0, |scale| *scale.get_ref());
     if let Some(key) = &input.scale
@@ -69,14 +75,12 @@ pub(crate) fn mesh(
     let folder = source.path_at(&written.span()).parent();
     let path = folder.unwrap_or(Path::new(".")).join(written.get_ref());
     let unreadable = |why: io::Error| Error::from(unreadable(&path, why));
-    let bytes = if let Some(content) = &input.content {
-        Cow::Borrowed(&content[..])
-    } else {
-        let read = file::read_mesh(&path);
-        Cow::Owned(read.map_err(|why| {
+    let bytes = match &input.content {
+        Some(content) => Cow::Borrowed(&content[..]),
+        None => Cow::Owned(file::read_mesh(&path).map_err(|why| {
             let message = format!("cannot read {}: {why}", path.display());
             Error::from(source.error(written.span(), message))
-        })?)
+        })?),
     };
     let is_of_arrays = input.content.is_some();
     let wrong = |fault: String| {

@@ -192,7 +192,19 @@ impl StressInput {
                 "`initial_stress` has stress components together with `k_0` or `friction_angle`: give one or the other (keys of a `base` file count, too)",
             );
         }
-        let ratio = match (&self.k_0, &self.friction_angle) {
+        Ok(InitialStress::AtRest(AtRest {
+            ratio: self.ratio(source, at)?,
+            surcharge: self.surcharge,
+        }))
+    }
+
+    /// Of the horizontal to the vertical effective stress.
+    fn ratio(&self, source: &Source, at: Range<usize>) -> Result<Ratio, Error> {
+        let profile = |input: &Spanned<ProfileInput>| input.get_ref().read(source, input.span());
+        let optional =
+            |input: &Option<Spanned<ProfileInput>>| input.as_ref().map(profile).transpose();
+        let wrong = |at: Range<usize>, why: &str| Err(source.error(at, why).into());
+        Ok(match (&self.k_0, &self.friction_angle) {
             (Some(_), Some(angle)) => {
                 return wrong(angle.span(), "give `k_0` or `friction_angle`, not both");
             }
@@ -219,10 +231,6 @@ impl StressInput {
                 }
             }
             (None, None) => Ratio::K0(1.0.into()),
-        };
-        Ok(InitialStress::AtRest(AtRest {
-            ratio,
-            surcharge: self.surcharge,
-        }))
+        })
     }
 }

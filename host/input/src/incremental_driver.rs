@@ -244,7 +244,7 @@ fn keyword<'a>(lines: &Lines<'_>, at: &Range<usize>, line: &'a str) -> Result<&'
     Ok(line.split_whitespace().next().unwrap_or_default())
 }
 
-fn step(lines: &mut Lines<'_>, at: Range<usize>, keyword: &str) -> Result<Step, Error> {
+fn refuse_other_keywords(lines: &Lines<'_>, at: Range<usize>, keyword: &str) -> Result<(), Error> {
     let refused = match keyword {
         "*DeformationGradient" => "laws here take small strains, no deformation gradients",
         "*PerturbationsS" | "*PerturbationsE" => {
@@ -276,6 +276,11 @@ fn step(lines: &mut Lines<'_>, at: Range<usize>, keyword: &str) -> Result<Step, 
         let error = lines.source.error(at, message);
         return Err(error.hint(format!("known are {}", known.join(", "))).into());
     }
+    Ok(())
+}
+
+fn step(lines: &mut Lines<'_>, at: Range<usize>, keyword: &str) -> Result<Step, Error> {
+    refuse_other_keywords(lines, at, keyword)?;
     let (at, [increments, _, time], every) = lines.step()?;
     let mut step = Step {
         increments: lines.whole(&at, increments, "the number of increments")?,
@@ -318,22 +323,9 @@ fn step(lines: &mut Lines<'_>, at: Range<usize>, keyword: &str) -> Result<Step, 
             step.frame = Frame::Roscoe;
             step.linear[1..].fill((true, 0.0));
         }
-        _ => {
+        test => {
             let (_, [change]) = lines.numbers("the change over the step")?;
-            // Which components are under stress control, and which one changes.
-            let (frame, stress, changed) = match keyword {
-                "*OedometricE1" => (Frame::Cartesian, 0..0, 0),
-                "*OedometricS1" => (Frame::Cartesian, 0..1, 0),
-                "*TriaxialE1" => (Frame::Cartesian, 1..3, 0),
-                "*TriaxialS1" => (Frame::Cartesian, 0..3, 0),
-                "*TriaxialUEq" => (Frame::Roscoe, 0..0, 1),
-                _ => (Frame::Roscoe, 1..2, 1),
-            };
-            step.frame = frame;
-            for component in &mut step.linear[stress] {
-                component.0 = true;
-            }
-            step.linear[changed].1 = change;
+            step.of_one_change(test, change);
         }
     }
     Ok(step)
@@ -362,6 +354,24 @@ fn frame(lines: &mut Lines<'_>) -> Result<Frame, Error> {
 }
 
 impl Step {
+    /// A test in which one component changes by so much.
+    fn of_one_change(&mut self, test: &str, change: f64) {
+        // Which components are under stress control, and which one changes.
+        let (frame, stress, changed) = match test {
+            "*OedometricE1" => (Frame::Cartesian, 0..0, 0),
+            "*OedometricS1" => (Frame::Cartesian, 0..1, 0),
+            "*TriaxialE1" => (Frame::Cartesian, 1..3, 0),
+            "*TriaxialS1" => (Frame::Cartesian, 0..3, 0),
+            "*TriaxialUEq" => (Frame::Roscoe, 0..0, 1),
+            _ => (Frame::Roscoe, 1..2, 1),
+        };
+        self.frame = frame;
+        for component in &mut self.linear[stress] {
+            component.0 = true;
+        }
+        self.linear[changed].1 = change;
+    }
+
     fn n_segments(&self) -> usize {
         self.harmonic.map_or(1, |_| self.increments)
     }

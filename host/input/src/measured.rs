@@ -20,20 +20,18 @@ const MOST_POINTS: usize = 20_000;
 pub(crate) fn read(source: &Source, input: &MeasuredInput) -> Result<Measured, Error> {
     let path = source.file_named(input.file.get_ref(), &input.file.span());
     let at_file = |message: String| Error::from(source.error(input.file.span(), message));
-    let bytes = read_text(&path)
-        .map_err(|why| at_file(format!("`file`: cannot read {}: {why}", path.display())))?;
-    let (mut reader, columns) = begin(&bytes)
-        .map_err(|why| at_file(format!("`file`: cannot read {}: {why}", path.display())))?;
+    let unreadable =
+        |why: String| at_file(format!("`file`: cannot read {}: {why}", path.display()));
+    let bytes = read_text(&path).map_err(|why| unreadable(why.to_string()))?;
+    let (mut reader, columns) = begin(&bytes).map_err(|why| unreadable(why.to_string()))?;
     let table = Table {
         source,
         path: &path,
         bytes: &bytes,
         columns,
     };
-    let [x, y] = [
-        table.position("x", &input.x)?,
-        table.position("y", &input.y)?,
-    ];
+    let x = table.position("x", &input.x)?;
+    let y = table.position("y", &input.y)?;
     let mut points = Vec::new();
     let mut row = ByteRecord::new();
     loop {
@@ -41,11 +39,9 @@ pub(crate) fn read(source: &Source, input: &MeasuredInput) -> Result<Measured, E
         if !is_row.map_err(|why| at_file(format!("`file`: {}: {why}", path.display())))? {
             break;
         }
-        let values = (
-            table.number(&row, x, &input.x)?,
-            table.number(&row, y, &input.y)?,
-        );
-        if let (Some(x), Some(y)) = values {
+        let x = table.number(&row, x, &input.x)?;
+        let y = table.number(&row, y, &input.y)?;
+        if let (Some(x), Some(y)) = (x, y) {
             let x = input.x_scale * x + input.x_offset;
             points.push((x, input.y_scale * y + input.y_offset));
         }
@@ -66,13 +62,11 @@ pub(crate) fn read(source: &Source, input: &MeasuredInput) -> Result<Measured, E
         );
         return Err(at_file(message));
     }
-    if let Some((x, y)) = points
-        .iter()
-        .find(|(x, y)| !(x.is_finite() && y.is_finite()))
-    {
-        let message =
-            format!("`file`: with its factors and offsets a point is ({x}, {y}), no finite number");
-        return Err(at_file(message));
+    let is_finite = |(x, y): &&(f64, f64)| x.is_finite() && y.is_finite();
+    if let Some((x, y)) = points.iter().find(|point| !is_finite(point)) {
+        return Err(at_file(format!(
+            "`file`: with its factors and offsets a point is ({x}, {y}), no finite number"
+        )));
     }
     Ok(Measured {
         label: input.label.clone(),

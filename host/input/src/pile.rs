@@ -5,8 +5,36 @@ use crate::build::line;
 use crate::case::{Case, PileInput};
 use mechanics::Simulation;
 use results::pile::{Base, Misfit, Parts, Pile};
-use text::suggestion;
+use text::{Source, suggestion};
 use toml::Spanned;
+
+/// Where the pile ends below: a group that is not its shaft, or a line.
+fn base(
+    source: &Source,
+    written: &Spanned<String>,
+    simulation: &Simulation,
+    shaft: &[usize],
+) -> Result<Base, Error> {
+    let name = written.get_ref();
+    let lines = &simulation.problem().mesh.lines;
+    let groups = || simulation.groups().iter().map(|group| group.name.as_str());
+    match groups().position(|other| other == name) {
+        Some(number) if shaft.contains(&number) => {
+            let message = format!("[pile]: group `{name}` cannot be both shaft and base");
+            Err(source.error(written.span(), message).into())
+        }
+        Some(number) => Ok(Base::Group(number)),
+        None if lines.contains_key(name) => Ok(Base::Line(name.clone())),
+        None => {
+            let message = format!("[pile]: there is neither a group nor a line `{name}`");
+            let names = groups().chain(lines.keys().map(String::as_str));
+            let error = source.error(written.span(), message);
+            Err(error
+                .hint(suggestion(name, names.collect::<Vec<_>>()))
+                .into())
+        }
+    }
+}
 
 /// The pile that a case names, within its mesh.
 ///
@@ -29,15 +57,11 @@ pub fn resolve(case: &Case, simulation: &Simulation) -> Result<Option<Pile>, Err
         })
     };
     let all = |names: &[Spanned<String>], key: &str| {
-        let numbers = names
-            .iter()
-            .map(group)
-            .collect::<Result<Vec<usize>, Error>>()?;
+        let numbers = names.iter().map(group);
+        let numbers = numbers.collect::<Result<Vec<usize>, Error>>()?;
         for (number, name) in names.iter().enumerate() {
-            if names[..number]
-                .iter()
-                .any(|other| other.get_ref() == name.get_ref())
-            {
+            let mut before = names[..number].iter();
+            if before.any(|other| other.get_ref() == name.get_ref()) {
                 let message = format!("[pile]: `{key}` names group `{}` twice", name.get_ref());
                 return Err(Error::from(source.error(name.span(), message)));
             }
@@ -51,28 +75,7 @@ pub fn resolve(case: &Case, simulation: &Simulation) -> Result<Option<Pile>, Err
     let of_pile = all(&input.group.0, "group")?;
     let shaft = all(&input.shaft.0, "shaft")?;
     line(mesh, source, &input.head)?;
-    let base = match number(&input.base) {
-        Some(number) => Base::Group(number),
-        None if mesh.lines.contains_key(input.base.get_ref()) => {
-            Base::Line(input.base.get_ref().clone())
-        }
-        None => {
-            let name = input.base.get_ref();
-            let message = format!("[pile]: there is neither a group nor a line `{name}`");
-            let names: Vec<&str> = group_names()
-                .chain(mesh.lines.keys().map(String::as_str))
-                .collect();
-            let error = source.error(input.base.span(), message);
-            return Err(error.hint(suggestion(name, names)).into());
-        }
-    };
-    if let Base::Group(number) = base
-        && shaft.contains(&number)
-    {
-        let name = input.base.get_ref();
-        let message = format!("[pile]: group `{name}` cannot be both shaft and base");
-        return Err(source.error(input.base.span(), message).into());
-    }
+    let base = base(source, &input.base, simulation, &shaft)?;
     let diameter = input.diameter.as_ref();
     if let Some(diameter) = diameter
         && !(*diameter.get_ref() > 0.0 && diameter.get_ref().is_finite())

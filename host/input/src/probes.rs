@@ -6,7 +6,7 @@ use crate::case::{Case, ProbeInput};
 use mechanics::Problem;
 use mechanics::ground::pressure_on;
 use mechanics::group::Group;
-use mechanics::mesh::Mesh;
+use mechanics::mesh::{Line, Mesh};
 use mechanics::problem::{Analysis, Formulation};
 use mechanics::settings::Control;
 use mechanics::{Place, Simulation};
@@ -186,6 +186,44 @@ impl Resolver<'_> {
             })
     }
 
+    /// The force of a line, or of a group there, in a direction.
+    fn force(
+        &self,
+        line: &Line,
+        nodes: Vec<usize>,
+        component: usize,
+        group: Option<usize>,
+    ) -> Probe {
+        let scale = self.input.scale;
+        let inside = group.and_then(|number| section(self.mesh(), line, number));
+        let is_whole = self.input.x.is_none() && self.input.y.is_none();
+        if let (Some(group), Some(part)) = (group, &inside)
+            && self.simulation.groups()[group].formulation == Formulation::ZeroThickness
+            && is_whole
+        {
+            return Probe::HandedOn {
+                group,
+                elements: part.elements.clone(),
+                component,
+                scale,
+            };
+        }
+        let (nodes, elements) = match inside {
+            None => (nodes, None),
+            Some(part) => {
+                let of_part = nodes.into_iter().filter(|node| part.nodes.contains(node));
+                (of_part.collect(), Some(part.elements))
+            }
+        };
+        Probe::Force {
+            nodes,
+            component,
+            group,
+            elements,
+            scale,
+        }
+    }
+
     fn on_line(
         &self,
         of: &Spanned<String>,
@@ -236,33 +274,7 @@ impl Resolver<'_> {
                     return Err(self.wrong("forces are summed"));
                 }
                 let group = group.map(|name| self.group_number(name)).transpose()?;
-                let inside = group.and_then(|number| section(self.mesh(), of_line, number));
-                let is_whole = self.input.x.is_none() && self.input.y.is_none();
-                if let (Some(group), Some(part)) = (group, &inside)
-                    && self.simulation.groups()[group].formulation == Formulation::ZeroThickness
-                    && is_whole
-                {
-                    return Ok(Probe::HandedOn {
-                        group,
-                        elements: part.elements.clone(),
-                        component,
-                        scale,
-                    });
-                }
-                let (nodes, elements) = match inside {
-                    None => (nodes, None),
-                    Some(part) => {
-                        let of_part = nodes.into_iter().filter(|node| part.nodes.contains(node));
-                        (of_part.collect(), Some(part.elements))
-                    }
-                };
-                Ok(Probe::Force {
-                    nodes,
-                    component,
-                    group,
-                    elements,
-                    scale,
-                })
+                Ok(self.force(of_line, nodes, component, group))
             }
             ("force", None) => Err(self.wrong("`force` needs the `group` whose forces are meant")),
             (_, Some(_)) => Err(self.wrong("with a line and a group, the quantity is a `force`")),
@@ -289,10 +301,9 @@ impl Resolver<'_> {
             .into()
     }
 
-    fn in_group(&self, name: &Spanned<String>, quantity: &Spanned<String>) -> Result<Probe, Error> {
-        let number = self.group_number(name)?;
+    /// The quantities that points of a group have, by name.
+    fn quantities(&self, number: usize) -> Vec<(String, PointQuantity)> {
         let group = &self.simulation.groups()[number];
-        let is_interface = group.jump_and_traction(0).is_some();
         let has_stress = group.global_stress(0).is_some();
         let mut known: Vec<(String, PointQuantity)> = Vec::new();
         if has_stress {
@@ -301,7 +312,7 @@ impl Resolver<'_> {
                 known.push((format!("strain_{component}"), PointQuantity::Strain(c)));
             }
         }
-        if is_interface {
+        if group.jump_and_traction(0).is_some() {
             for (c, component) in ["n", "t"].iter().enumerate() {
                 known.push((format!("jump_{component}"), PointQuantity::Jump(c)));
                 known.push((format!("traction_{component}"), PointQuantity::Traction(c)));
@@ -313,20 +324,22 @@ impl Resolver<'_> {
             Pressure::Excess | Pressure::Total(_) => problem.has_pore_pressure() && has_stress,
         });
         known.extend(pressures.map(|q| (q.name().to_owned(), PointQuantity::Pressure(q))));
-        let later = self
-            .simulation
-            .swaps()
-            .iter()
-            .flatten()
-            .filter(|(g, _)| *g == number);
+        let later = self.simulation.swaps().iter().flatten();
+        let later = later.filter(|(group, _)| *group == number);
         for law in later.map(|(_, law)| law).chain([&group.law]) {
             for variable in &law.built.law.formulation().internal_variables {
-                known.push((
-                    variable.id.clone(),
-                    PointQuantity::Internal(variable.id.clone()),
-                ));
+                let id = &variable.id;
+                known.push((id.clone(), PointQuantity::Internal(id.clone())));
             }
         }
+        known
+    }
+
+    fn in_group(&self, name: &Spanned<String>, quantity: &Spanned<String>) -> Result<Probe, Error> {
+        let number = self.group_number(name)?;
+        let group = &self.simulation.groups()[number];
+        let problem = self.simulation.problem();
+        let known = self.quantities(number);
         let Some((_, point_quantity)) = known.iter().find(|(id, _)| id == quantity.get_ref())
         else {
             let names: Vec<&str> = known.iter().map(|(id, _)| id.as_str()).collect();

@@ -6,6 +6,7 @@ use crate::pressures::Pressure;
 use crate::table::{push_count, push_shortest};
 use mechanics::Simulation;
 use mechanics::element::Kind;
+use mechanics::group::Group;
 use mechanics::problem::Formulation;
 use mechanics::recovery::MeshError;
 use mechanics::simulation::Snapshot;
@@ -178,6 +179,36 @@ fn reals(values: impl Iterator<Item = f64>) -> String {
     String::from_utf8_lossy(&text).into_owned()
 }
 
+/// Arrays of the cells.
+#[derive(Default)]
+struct Cells {
+    connectivity: Vec<usize>,
+    offsets: Vec<usize>,
+    types: Vec<usize>,
+    groups: Vec<usize>,
+    active: Vec<usize>,
+}
+
+impl Cells {
+    fn of(groups: &[Group]) -> Self {
+        let mut cells = Self::default();
+        for (number, group) in groups.iter().enumerate() {
+            for element in 0..group.kinematics.n_elements() {
+                let nodes = group.kinematics.nodes(element);
+                let is_joint = group.formulation == Formulation::ZeroThickness;
+                let shown = if is_joint { &nodes[..3] } else { nodes };
+                cells.connectivity.extend(shown);
+                cells.offsets.push(cells.connectivity.len());
+                let of_nodes = cell_type(shown.len());
+                cells.types.push(of_nodes.map_or(0, usize::from));
+                cells.groups.push(number);
+                cells.active.push(usize::from(group.is_active));
+            }
+        }
+        cells
+    }
+}
+
 /// The text of a file. Cells stand group by group, as `cell_data` has them.
 pub(crate) fn unstructured_grid(
     snapshot: &Snapshot<'_>,
@@ -185,37 +216,21 @@ pub(crate) fn unstructured_grid(
     has_mesh_error: bool,
 ) -> String {
     let mesh = snapshot.mesh;
-    let mut connectivity = Vec::new();
-    let (mut offsets, mut types, mut groups) = (Vec::new(), Vec::new(), Vec::new());
-    let mut active = Vec::new();
-    let mut end = 0;
-    for (number, group) in snapshot.groups.iter().enumerate() {
-        for element in 0..group.kinematics.n_elements() {
-            let nodes = group.kinematics.nodes(element);
-            let is_joint = group.formulation == Formulation::ZeroThickness;
-            let shown = if is_joint { &nodes[..3] } else { nodes };
-            connectivity.extend(shown.iter().copied());
-            end += shown.len();
-            offsets.push(end);
-            types.push(cell_type(shown.len()).map_or(0, usize::from));
-            groups.push(number);
-            active.push(usize::from(group.is_active));
-        }
-    }
+    let Cells {
+        connectivity,
+        offsets,
+        types,
+        groups,
+        active,
+    } = Cells::of(snapshot.groups);
     let points = reals(mesh.nodes.iter().flat_map(|[x, y]| [*x, *y, 0.0]));
-    let u = reals(
-        snapshot
-            .displacement
-            .chunks_exact(2)
-            .flat_map(|u| [u[0], u[1], 0.0]),
-    );
+    let pairs = snapshot.displacement.chunks_exact(2);
+    let u = reals(pairs.flat_map(|u| [u[0], u[1], 0.0]));
     let connectivity = list(&connectivity);
     let mut cells = String::new();
     let of_mesh = has_mesh_error.then(|| mesh_error(snapshot));
-    for (name, values) in cell_data(snapshot, has_pressures)
-        .into_iter()
-        .chain(of_mesh)
-    {
+    let data = cell_data(snapshot, has_pressures);
+    for (name, values) in data.into_iter().chain(of_mesh) {
         let values = reals(values.into_iter());
         let _ = writeln!(
             cells,

@@ -6,8 +6,11 @@ use crate::pile::{State, Station};
 use crate::pressures::Pressure;
 use mechanics::Place;
 use mechanics::simulation::Snapshot;
+use plotters::coord::Shift;
+use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::ops::Range;
 use std::path::Path;
 use text::Error;
 use text::write::replace;
@@ -148,9 +151,9 @@ impl Figures {
     }
 
     /// Takes what holds along the pile, where that is asked for after this increment, one of `of`. The curve is named by
-    /// the head load, net if there is one.
+    /// the head load, net if there is one, and by its increment if a curve under that load exists.
     pub(crate) fn along_pile(&mut self, place: &Place, of: usize, (state, unit): (&State, &str)) {
-        let phase = &place.phase;
+        let Place { phase, increment } = place;
         let load = state.net.map_or(state.loads.head, |net| net[0]);
         for (figure, curves) in &mut self.drawn {
             let increments = figure.along_pile.as_ref();
@@ -162,6 +165,12 @@ impl Figures {
                 let name = match figure.y.len() {
                     1 => format!("{phase}, {load:.0} {unit}"),
                     _ => format!("{y}, {phase}, {load:.0} {unit}"),
+                };
+                let is_taken = curves.iter().any(|curve| curve.name == name);
+                let name = if is_taken {
+                    format!("{name}, increment {increment}")
+                } else {
+                    name
                 };
                 let points = state.stations.iter().filter_map(pair).collect();
                 curves.push(Curve { name, points });
@@ -308,12 +317,96 @@ fn svg(labels: &Labels, curves: &[Curve], measured: &[Measured]) -> Result<Strin
     Ok(text)
 }
 
-fn draw(
-    text: &mut String,
+type Area<'s> = DrawingArea<SVGBackend<'s>, Shift>;
+type Chart<'a, 's> = ChartContext<'a, SVGBackend<'s>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+type Drawn<T> = Result<T, DrawingAreaErrorKind<std::io::Error>>;
+
+/// An empty plot over these ranges.
+fn axes<'a, 's>(
+    area: &'a Area<'s>,
     labels: &Labels,
+    [x, y]: [Range<f64>; 2],
+) -> Drawn<Chart<'a, 's>> {
+    let mut chart = ChartBuilder::on(area)
+        .caption(&labels.title, ("sans-serif", 15))
+        .margin(MARGIN)
+        .margin_right(MARGIN_RIGHT)
+        .x_label_area_size(BELOW)
+        .y_label_area_size(BESIDE)
+        .build_cartesian_2d(x, y)?;
+    chart
+        .configure_mesh()
+        .light_line_style(TRANSPARENT)
+        .bold_line_style(BLACK.mix(0.12))
+        .x_desc(&labels.x)
+        .y_desc(&labels.y)
+        .axis_desc_style(("sans-serif", 14))
+        .label_style(("sans-serif", 12))
+        .draw()?;
+    Ok(chart)
+}
+
+/// Height of an entry of a legend beside the plot.
+fn entry(number: usize) -> i32 {
+    40 + 17 * number as i32
+}
+
+/// Writes the name of an entry.
+fn name_beside(legend: &Area<'_>, name: &str, number: usize) -> Drawn<()> {
+    let at = (24, entry(number) - 6);
+    legend.draw(&Text::new(name, at, ("sans-serif", 12)))
+}
+
+/// Curves in a plot, with their entries in a legend beside it if there is one.
+fn draw_curves(
+    chart: &mut Chart<'_, '_>,
     curves: &[Curve],
+    legend: Option<&Area<'_>>,
+) -> Drawn<()> {
+    for (number, curve) in curves.iter().enumerate() {
+        let style = COLOURS[number % COLOURS.len()].stroke_width(2);
+        chart
+            .draw_series(LineSeries::new(curve.points.iter().copied(), style))?
+            .label(&curve.name)
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
+        if let Some(legend) = legend {
+            let y = entry(number);
+            legend.draw(&PathElement::new([(0, y), (18, y)], style))?;
+            name_beside(legend, &curve.name, number)?;
+        }
+    }
+    Ok(())
+}
+
+/// Measured points in a plot; their entries follow those of `number` curves.
+fn draw_measured(
+    chart: &mut Chart<'_, '_>,
     measured: &[Measured],
-) -> Result<(), DrawingAreaErrorKind<std::io::Error>> {
+    mut number: usize,
+    legend: Option<&Area<'_>>,
+) -> Drawn<()> {
+    for measured in measured {
+        let own = measured.of_curve.or(measured.colour_of);
+        let colour = COLOURS[own.unwrap_or(number) % COLOURS.len()];
+        let style = colour.stroke_width(1);
+        let markers = measured.points.iter();
+        let drawn = chart.draw_series(markers.map(|&point| Circle::new(point, MARKER, style)))?;
+        if measured.of_curve.is_some() {
+            continue;
+        }
+        drawn
+            .label(&measured.label)
+            .legend(move |(x, y)| Circle::new((x + 9, y), MARKER, style));
+        if let Some(legend) = legend {
+            legend.draw(&Circle::new((9, entry(number)), MARKER, style))?;
+            name_beside(legend, &measured.label, number)?;
+        }
+        number += 1;
+    }
+    Ok(())
+}
+
+fn draw(text: &mut String, labels: &Labels, curves: &[Curve], measured: &[Measured]) -> Drawn<()> {
     let points = || {
         let drawn = curves.iter().flat_map(|curve| &curve.points);
         drawn.chain(measured.iter().flat_map(|measured| &measured.points))
@@ -336,58 +429,10 @@ fn draw(
     let area = SVGBackend::with_string(text, (width, SIZE.1)).into_drawing_area();
     area.fill(&WHITE)?;
     let (left, right) = area.split_horizontally(SIZE.0);
-    let mut chart = ChartBuilder::on(&left)
-        .caption(&labels.title, ("sans-serif", 15))
-        .margin(MARGIN)
-        .margin_right(MARGIN_RIGHT)
-        .x_label_area_size(BELOW)
-        .y_label_area_size(BESIDE)
-        .build_cartesian_2d(x, y)?;
-    chart
-        .configure_mesh()
-        .light_line_style(TRANSPARENT)
-        .bold_line_style(BLACK.mix(0.12))
-        .x_desc(&labels.x)
-        .y_desc(&labels.y)
-        .axis_desc_style(("sans-serif", 14))
-        .label_style(("sans-serif", 12))
-        .draw()?;
-    let colours = || COLOURS.into_iter().cycle();
-    // Where an entry of a legend beside the figure stands.
-    let entry = |number: usize| 40 + 17 * number as i32;
-    let name_beside = |name: &str, y| right.draw(&Text::new(name, (24, y - 6), ("sans-serif", 12)));
-    for (number, (curve, colour)) in (0..).zip(curves.iter().zip(colours())) {
-        let style = colour.stroke_width(2);
-        chart
-            .draw_series(LineSeries::new(curve.points.iter().copied(), style))?
-            .label(&curve.name)
-            .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
-        if beside {
-            let y = entry(number);
-            right.draw(&PathElement::new([(0, y), (18, y)], style))?;
-            name_beside(&curve.name, y)?;
-        }
-    }
-    let mut number = curves.len();
-    for measured in measured {
-        let own = measured.of_curve.or(measured.colour_of);
-        let colour = COLOURS[own.unwrap_or(number) % COLOURS.len()];
-        let style = colour.stroke_width(1);
-        let markers = measured.points.iter();
-        let drawn = chart.draw_series(markers.map(|&point| Circle::new(point, MARKER, style)))?;
-        if measured.of_curve.is_some() {
-            continue;
-        }
-        drawn
-            .label(&measured.label)
-            .legend(move |(x, y)| Circle::new((x + 9, y), MARKER, style));
-        if beside {
-            let y = entry(number);
-            right.draw(&Circle::new((9, y), MARKER, style))?;
-            name_beside(&measured.label, y)?;
-        }
-        number += 1;
-    }
+    let mut chart = axes(&left, labels, [x, y])?;
+    let right = beside.then_some(&right);
+    draw_curves(&mut chart, curves, right)?;
+    draw_measured(&mut chart, measured, curves.len(), right)?;
     if let Some(corner) = corner.filter(|_| entries > 1) {
         chart
             .configure_series_labels()
@@ -404,14 +449,14 @@ fn draw(
 fn empty_corner(
     curves: &[Curve],
     measured: &[Measured],
-    [x, y]: [&std::ops::Range<f64>; 2],
+    [x, y]: [&Range<f64>; 2],
     legend: [usize; 2],
 ) -> Option<SeriesLabelPosition> {
     // Parts of the plot, which is what labels and margins leave of the figure.
     let plot = SIZE.0 - BESIDE - MARGIN - MARGIN_RIGHT;
     let width = (legend[0] + 10) as f64 / f64::from(plot);
     let height = (legend[1] + 10) as f64 / f64::from(SIZE.1 - 84);
-    let part = |v: f64, range: &std::ops::Range<f64>| (v - range.start) / (range.end - range.start);
+    let part = |v: f64, range: &Range<f64>| (v - range.start) / (range.end - range.start);
     let covered = |right: bool, upper: bool| {
         let inside = |u: f64, v: f64| {
             let (u, v) = (part(u, x), part(v, y));
@@ -444,7 +489,7 @@ fn empty_corner(
 }
 
 /// The range of some values, widened by a fraction of it; never empty.
-fn range(values: impl Iterator<Item = f64>, margin: f64) -> std::ops::Range<f64> {
+fn range(values: impl Iterator<Item = f64>, margin: f64) -> Range<f64> {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
         (low.min(v), high.max(v))
     });

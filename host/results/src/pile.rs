@@ -215,6 +215,29 @@ struct Held<'g> {
     forces: [f64; 3],
 }
 
+/// What acts on groups from outside (1), and the weight of each, downward, kN.
+fn external(
+    snapshot: &Snapshot<'_>,
+    there: &[usize],
+    n_dofs: usize,
+) -> (Vec<f64>, Vec<(usize, f64)>) {
+    let mut outer = vec![0.0; n_dofs];
+    let mut weights = Vec::new();
+    for &number in there {
+        let group = &snapshot.groups[number];
+        let weight = snapshot.acting.weight_of(number, snapshot.problem, group);
+        let pores = snapshot
+            .acting
+            .pore_forces_of(number, snapshot.problem, group);
+        let forces = group.forces(n_dofs).into_iter().zip(pores).zip(&weight);
+        for (outer, ((force, pore), weight)) in outer.iter_mut().zip(forces) {
+            *outer += force - pore - weight;
+        }
+        weights.push((number, -weight.iter().skip(1).step_by(2).sum::<f64>()));
+    }
+    (outer, weights)
+}
+
 impl Pile {
     /// The pile within the mesh of a simulation.
     ///
@@ -315,19 +338,7 @@ impl Pile {
             return None;
         }
         let n_dofs = 2 * problem.mesh.nodes.len();
-        // What acts from outside (1), and the weight of each group, downward.
-        let mut outer = vec![0.0; n_dofs];
-        let mut weights = Vec::new();
-        for &number in &there {
-            let group = &groups[number];
-            let weight = snapshot.acting.weight_of(number, problem, group);
-            let pores = snapshot.acting.pore_forces_of(number, problem, group);
-            let forces = group.forces(n_dofs).into_iter().zip(pores).zip(&weight);
-            for (outer, ((force, pore), weight)) in outer.iter_mut().zip(forces) {
-                *outer += force - pore - weight;
-            }
-            weights.push((number, -weight.iter().skip(1).step_by(2).sum::<f64>()));
-        }
+        let (outer, weights) = external(snapshot, &there, n_dofs);
         let outer = |node: usize| outer[2 * node + 1];
         let geometry = &self.geometry;
         let mut held = Self::held(snapshot, &geometry.shaft, n_dofs);

@@ -186,9 +186,8 @@ impl Probe {
                 scale,
             } => {
                 active(snapshot, *group)?;
-                let values = points
-                    .iter()
-                    .map(|&point| quantity.at(snapshot, *group, point));
+                let of = |&point: &usize| quantity.at(snapshot, *group, point);
+                let values = points.iter().map(of);
                 reduced(*reduce, values, weights).map(|value| scale * value)
             }
             Self::Displacement {
@@ -197,9 +196,8 @@ impl Probe {
                 reduce,
                 scale,
             } => {
-                let values = nodes
-                    .iter()
-                    .map(|&n| Some(snapshot.displacement[2 * n + component]));
+                let of = |&n: &usize| Some(snapshot.displacement[2 * n + component]);
+                let values = nodes.iter().map(of);
                 reduced(*reduce, values, &[]).map(|value| scale * value)
             }
             Self::Force {
@@ -216,19 +214,7 @@ impl Probe {
                     let nodes = tied_nodes(snapshot.groups, nodes);
                     return Some(scale * sum(&nodes, snapshot.reaction));
                 };
-                let group = active(snapshot, number)?;
-                let n_dofs = snapshot.displacement.len();
-                let mut forces = match elements {
-                    None => group.forces(n_dofs),
-                    Some(elements) => group.forces_of(elements, n_dofs),
-                };
-                // Weight and pore water act within the elements; the rest comes from others.
-                let (acting, problem) = (snapshot.acting, snapshot.problem);
-                let within = acting.in_bodies(problem, (number, group), elements.as_deref());
-                for (force, within) in forces.iter_mut().zip(within.unwrap_or_default()) {
-                    *force -= within;
-                }
-                fold(snapshot.ties, &mut forces);
+                let forces = forces_of_others(snapshot, number, elements.as_deref())?;
                 Some(scale * sum(nodes, &forces))
             }
             Self::HandedOn {
@@ -246,6 +232,28 @@ impl Probe {
                 .sum(),
         }
     }
+}
+
+/// What others exert on a group, or on some of its elements, by degree of freedom.
+fn forces_of_others(
+    snapshot: &Snapshot<'_>,
+    number: usize,
+    elements: Option<&[usize]>,
+) -> Option<Vec<f64>> {
+    let group = active(snapshot, number)?;
+    let n_dofs = snapshot.displacement.len();
+    let mut forces = match elements {
+        None => group.forces(n_dofs),
+        Some(elements) => group.forces_of(elements, n_dofs),
+    };
+    // Weight and pore water act within the elements; the rest comes from others.
+    let (acting, problem) = (snapshot.acting, snapshot.problem);
+    let within = acting.in_bodies(problem, (number, group), elements);
+    for (force, within) in forces.iter_mut().zip(within.unwrap_or_default()) {
+        *force -= within;
+    }
+    fold(snapshot.ties, &mut forces);
+    Some(forces)
 }
 
 /// The group of this number if it is there.

@@ -181,21 +181,16 @@ impl Recorder {
     ) -> Result<Self, Error> {
         wanted.probes.narrow(simulation);
         let settings = wanted.output;
-        let columns = ["phase", "increment", "time"]
-            .into_iter()
-            .chain(wanted.columns())
-            .chain(["iterations"]);
+        let columns = |time| {
+            let place = ["phase", "increment", time].into_iter();
+            place.chain(wanted.columns()).chain(["iterations"])
+        };
         let at = state.as_ref();
-        let history_from = at.map(|state| state.history);
-        let path_columns = ["phase", "increment", "load_factor"]
-            .into_iter()
-            .chain(wanted.columns())
-            .chain(["iterations"]);
-        let path_from = at.and_then(|state| state.path);
-        let path = wanted
-            .follows_path
-            .then(|| Table::begin(folder.join("path.csv"), path_columns, path_from))
-            .transpose()?;
+        let from = at.and_then(|state| state.path);
+        let path = || Table::begin(folder.join("path.csv"), columns("load_factor"), from);
+        let path = wanted.follows_path.then(path).transpose()?;
+        let from = at.map(|state| state.history);
+        let history = Table::begin(folder.join("history.csv"), columns("time"), from)?;
         let from = at.and_then(|state| state.profile);
         let profile = Profile::begin(folder, settings.profile, simulation, from)?;
         let from = at.and_then(|state| state.points);
@@ -204,7 +199,6 @@ impl Recorder {
         if let Some(pile) = &wanted.pile {
             pile.looks_at(&mut looked_at, simulation);
         }
-        let history = Table::begin(folder.join("history.csv"), columns, history_from)?;
         let summary = Progress::new(about, &wanted, simulation);
         let figures = empty_figures(&wanted);
         let from = at.and_then(|state| state.pile.as_ref());
@@ -228,12 +222,7 @@ impl Recorder {
             seconds: Duration::ZERO,
         };
         if let Some(state) = state {
-            results.summary.course = state.course;
-            results.figures.restore(state.curves);
-            results.seconds = state.seconds;
-            if let (Some(fields), Some(written)) = (&mut results.fields, state.fields) {
-                fields.written = written;
-            }
+            results.restore(state);
         }
         let running = Running {
             head: results.summary.head(),
@@ -241,6 +230,16 @@ impl Recorder {
         };
         summary::write(folder, running)?;
         Ok(results)
+    }
+
+    /// What the tables of an interrupted run do not hold.
+    fn restore(&mut self, state: ResultsState) {
+        self.summary.course = state.course;
+        self.figures.restore(state.curves);
+        self.seconds = state.seconds;
+        if let (Some(fields), Some(written)) = (&mut self.fields, state.fields) {
+            fields.written = written;
+        }
     }
 
     /// How far the results have come, after waiting until they are on the disk.
@@ -429,8 +428,9 @@ impl Recorder {
         self.begins(&place.phase, snapshot);
         let (probes, pile) = self.values(place, snapshot)?;
         let start = Instant::now();
+        let iterations = increment.iterations;
         self.history
-            .row(history_row(place, *time, &probes, increment.iterations));
+            .row(history_row(place, *time, &probes, iterations));
         self.history.flush()?;
         if self.settings.profile.includes(place.increment, *of)
             && let Some(profile) = &mut self.profile
@@ -455,10 +455,10 @@ impl Recorder {
         }
         if place.increment == *of {
             self.note_sizes(snapshot);
-        }
-        if self.settings.mesh_error && place.increment == *of {
-            let found = OfPhase::of(&place.phase, snapshot);
-            self.summary.course.mesh_errors.push(found);
+            if self.settings.mesh_error {
+                let found = OfPhase::of(&place.phase, snapshot);
+                self.summary.course.mesh_errors.push(found);
+            }
         }
         if let Some(warning) = &increment.unreliable {
             self.log.unreliable(place, warning)?;

@@ -194,6 +194,21 @@ pub fn write_of(folder: &Path, known: Known) -> Result<PathBuf, Error> {
     write_as(&folders, &default_path(&folders), Some(known), For::Screen)
 }
 
+fn refuse_without_results(folders: &[PathBuf]) -> Result<(), Error> {
+    let Some(folder) = folders.iter().find(|f| !has_results(f)) else {
+        return Ok(());
+    };
+    let why = if folder.is_dir() {
+        "has no results of a run (`history.csv`)"
+    } else {
+        "is no folder"
+    };
+    Err(Error::Usage(format!(
+        "{} {why}: `pilum run CASE --out FOLDER` writes them",
+        folder.display()
+    )))
+}
+
 fn write_as(
     folders: &[PathBuf],
     out: &Path,
@@ -204,18 +219,8 @@ fn write_as(
         return Err(Error::Usage("name at least one results folder".to_owned()));
     }
     let study = study_among(folders)?;
-    if study.is_none()
-        && let Some(folder) = folders.iter().find(|f| !has_results(f))
-    {
-        let why = if folder.is_dir() {
-            "has no results of a run (`history.csv`)"
-        } else {
-            "is no folder"
-        };
-        return Err(Error::Usage(format!(
-            "{} {why}: `pilum run CASE --out FOLDER` writes them",
-            folder.display()
-        )));
+    if study.is_none() {
+        refuse_without_results(folders)?;
     }
     let is_ours = out.is_dir() || out == default_path(folders);
     let out = if out.is_dir() {

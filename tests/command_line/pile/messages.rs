@@ -217,6 +217,13 @@ fn what_is_odd_about_a_pile_is_said_before_it_is_loaded() {
             ("head = \"head\"\n", "head = \"head\"\ndiameter = 0.8\n"),
             None,
         ),
+        (
+            (
+                "displacement = [{ line = \"head\", z = -0.09 }]",
+                "force = [{ line = \"head\", z = -2e6 }]",
+            ),
+            Some("phase `push` puts a force of 2000000 kN on the head, 4.0e6 kPa over its section"),
+        ),
     ] {
         let place = Place::new();
         assert!(PILE.contains(edit.0), "{edit:?}");

@@ -1,7 +1,7 @@
 //! From what a mesh file says to the mesh of a case.
 
 use super::Wanted;
-use super::contents::{Contents, Element};
+use super::contents::{Contents, Element, Node};
 use super::cursor::Fault;
 use super::kind::{Kind, MOST_NODES};
 use indexmap::IndexMap;
@@ -240,6 +240,40 @@ impl Assembly<'_> {
         }
     }
 
+    /// Place of a node in the plane, m. Lengths up to `nothing` are round-off.
+    fn in_plane(&self, node: &Node, nothing: f64) -> Result<[f64; 2], Fault> {
+        let (contents, wanted) = (self.contents, self.wanted);
+        let [mut x, y, z] = node.at.map(|at| wanted.scale * at);
+        let wrong = |message: String| Err(contents.cursor.fault(node.place, &message));
+        let name = || contents.node(node.number);
+        if [x, y, z].iter().any(|at| at.abs() > FARTHEST) {
+            return wrong(format!(
+                "{} is at ({x:e}, {y:e}), expected at most {FARTHEST:e} m",
+                name()
+            ));
+        }
+        if z.abs() > nothing {
+            return wrong(format!(
+                "{} is at z = {z}: the mesh does not lie in the plane of x and y (in axisymmetry x is the \
+                 radius, y the axis)",
+                name()
+            ));
+        }
+        if wanted.analysis == Analysis::Axisymmetric {
+            if x < -nothing {
+                return wrong(format!(
+                    "{} is at x = {x}, across the axis; x is the radius, 0 on the axis",
+                    name()
+                ));
+            }
+            // Round-off of Gmsh; what is on the axis is told by 0.
+            if x.abs() <= 1e-3 * nothing {
+                x = 0.0;
+            }
+        }
+        Ok([x, y])
+    }
+
     /// The nodes of the mesh, and their numbers by those of the file.
     fn nodes(&mut self) -> Result<Numbered, Fault> {
         let (contents, wanted) = (self.contents, self.wanted);
@@ -272,35 +306,8 @@ impl Assembly<'_> {
             if !is_used[place] {
                 continue;
             }
-            let [mut x, y, z] = node.at.map(|at| wanted.scale * at);
-            let wrong = |message: String| Err(contents.cursor.fault(node.place, &message));
-            if [x, y, z].iter().any(|at| at.abs() > FARTHEST) {
-                return wrong(format!(
-                    "{} is at ({x:e}, {y:e}), expected at most {FARTHEST:e} m",
-                    contents.node(node.number)
-                ));
-            }
-            if z.abs() > nothing {
-                return wrong(format!(
-                    "{} is at z = {z}: the mesh does not lie in the plane of x and y (in \
-                     axisymmetry x is the radius, y the axis)",
-                    contents.node(node.number)
-                ));
-            }
-            if wanted.analysis == Analysis::Axisymmetric {
-                if x < -nothing {
-                    return wrong(format!(
-                        "{} is at x = {x}, across the axis; x is the radius, 0 on the axis",
-                        contents.node(node.number)
-                    ));
-                }
-                // Round-off of Gmsh; what is on the axis is told by 0.
-                if x.abs() <= 1e-3 * nothing {
-                    x = 0.0;
-                }
-            }
             number.insert(place, nodes.len());
-            nodes.push([x, y]);
+            nodes.push(self.in_plane(node, nothing)?);
         }
         for (ends, place) in self.put_in.iter().zip(contents.nodes.len()..) {
             let [p, q] = ends.map(|end| nodes[number[&end]]);
@@ -361,19 +368,22 @@ impl Assembly<'_> {
                 }
             }
         }
-        for (middle, _) in is_corner.iter().enumerate().filter(|(_, is)| **is) {
-            if let Some(side) = &sides[middle] {
-                let owner = side.owners[0].map_or(0, |(owner, _)| owner);
-                let element = self.taken[owner].0;
-                let message = format!(
-                    "the middle of a side of {} is a corner of another element: the mesh \
-                     does not fit together there",
-                    self.contents.element(element)
-                );
-                return self.fault(element, &message);
-            }
+        let corners = sides.iter().zip(&is_corner).filter(|(_, is)| **is);
+        match corners.filter_map(|(side, _)| side.as_ref()).next() {
+            Some(side) => self.corner_in_the_middle(side),
+            None => Ok(sides),
         }
-        Ok(sides)
+    }
+
+    fn corner_in_the_middle<T>(&self, side: &Side) -> Result<T, Fault> {
+        let owner = side.owners[0].map_or(0, |(owner, _)| owner);
+        let element = self.taken[owner].0;
+        let message = format!(
+            "the middle of a side of {} is a corner of another element: the mesh \
+             does not fit together there",
+            self.contents.element(element)
+        );
+        self.fault(element, &message)
     }
 
     /// Names the lines and points of the mesh.

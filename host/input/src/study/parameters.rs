@@ -173,6 +173,31 @@ fn check_values(
     Ok(())
 }
 
+/// Where and why `levels` do not go with the method and the spread, which is called and written so.
+fn wrong_levels(
+    input: &ParameterInput,
+    method: Method,
+    is_listed: bool,
+    (called, place): (&str, &Range<usize>),
+) -> Option<(Range<usize>, String)> {
+    match &input.levels {
+        Some(levels) if method != Method::Grid || is_listed => {
+            let message = "`levels` is for distributions in a grid".to_owned();
+            Some((levels.span(), message))
+        }
+        Some(levels) if !(1..=MOST_RUNS).contains(levels.get_ref()) => {
+            let message = format!("`levels`: {}, expected 1 to {MOST_RUNS}", levels.get_ref());
+            Some((levels.span(), message))
+        }
+        None if method == Method::Grid && !is_listed => {
+            let message =
+                format!("`{called}`: a grid needs `levels`, how many values of it there are");
+            Some((place.clone(), message))
+        }
+        _ => None,
+    }
+}
+
 pub(super) fn parameter(
     source: &Source,
     method: Method,
@@ -233,21 +258,8 @@ pub(super) fn parameter(
     if method == Method::List && !is_listed {
         return wrong(place, format!("`{called}`: a list takes `values`"));
     }
-    match &input.levels {
-        Some(levels) if method != Method::Grid || is_listed => {
-            let message = "`levels` is for distributions in a grid".to_owned();
-            return wrong(levels.span(), message);
-        }
-        Some(levels) if !(1..=MOST_RUNS).contains(levels.get_ref()) => {
-            let message = format!("`levels`: {}, expected 1 to {MOST_RUNS}", levels.get_ref());
-            return wrong(levels.span(), message);
-        }
-        None if method == Method::Grid && !is_listed => {
-            let message =
-                format!("`{called}`: a grid needs `levels`, how many values of it there are");
-            return wrong(place, message);
-        }
-        _ => {}
+    if let Some((at, message)) = wrong_levels(input, method, is_listed, (called, &place)) {
+        return wrong(at, message);
     }
     if input.whole && is_listed {
         return wrong(

@@ -40,6 +40,7 @@ pub(crate) fn warnings(
     warnings.extend(vast(problem));
     warnings.extend(loose(problem));
     warnings.extend(weights(problem));
+    warnings.extend(dry_weights(problem));
     warnings.extend(lost(problem));
     warnings.extend(super::uncovered_loads::warnings(problem));
     warnings.extend(beside_undrained(problem));
@@ -216,6 +217,48 @@ fn weights(problem: &Problem) -> Vec<String> {
                 ));
             }
         }
+    }
+    warnings
+}
+
+/// Ground at or below the water table that has one unit weight only.
+fn dry_weights(problem: &Problem) -> Vec<String> {
+    let mesh = &problem.mesh;
+    let later = problem.phases.iter().map(|phase| &phase.water_level);
+    let later = later.flatten();
+    let first = problem.water.iter().map(|water| &water.level);
+    let levels: Vec<&Profile> = first.chain(later).collect();
+    let mut warnings = Vec::new();
+    for (number, group) in problem.groups.iter().enumerate() {
+        let is_ground = group.initial_stress.is_some() && group.pore_water;
+        if !is_ground || group.unit_weight == 0.0 || group.saturated_unit_weight.is_some() {
+            continue;
+        }
+        let own = mesh.solids.iter().filter(|solid| solid.group == number);
+        let nodes: Vec<[f64; 2]> = own
+            .flat_map(|solid| solid.nodes().iter().map(|&node| mesh.nodes[node]))
+            .collect();
+        let close = ROUNDED * mesh.longer_side();
+        let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
+        for level in &levels {
+            for [x, y] in &nodes {
+                let height = y - level.at(*x);
+                ends = [ends[0].min(height), ends[1].max(height)];
+            }
+        }
+        if ends[0] >= -close {
+            continue;
+        }
+        let place = if ends[1] > close {
+            "crosses"
+        } else {
+            "lies below"
+        };
+        warnings.push(format!(
+            "group `{}` {place} the water table and has no `saturated_unit_weight`: its `unit_weight` {} counts below \
+             the table too, as that of ground and water together",
+            group.name, group.unit_weight
+        ));
     }
     warnings
 }

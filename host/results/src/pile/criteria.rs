@@ -14,6 +14,8 @@ const EXPLAINED: f64 = 0.98;
 const FEWEST: usize = 4;
 /// Elastic slip of joints above this share of the settlement changes the result.
 const SLIP: f64 = 0.1;
+/// A load that rises by less than this share of its largest value is held.
+const HELD: f64 = 0.01;
 
 /// The course of the pile's loads in a phase; loads are net ones.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -23,6 +25,8 @@ pub(crate) struct OfPhase {
     pub(crate) resets: bool,
     /// The pile is in place: its interfaces are active and its law is that of the pile.
     pub(crate) is_in_place: bool,
+    /// The phase prescribes the settlement of the head.
+    moves_head: bool,
     /// E A of the head's section, kN.
     stiffness: Option<f64>,
     weight: f64,
@@ -45,6 +49,21 @@ impl OfPhase {
     fn curve(&self, direction: f64) -> Vec<[f64; 4]> {
         let points = std::iter::once(&self.start).chain(&self.points);
         points.map(|point| point.map(|v| direction * v)).collect()
+    }
+
+    /// Why a curve of it is no load test: the head moves although no load on it rises, as with ground that settles.
+    fn no_test(&self, curve: &[[f64; 4]]) -> Option<String> {
+        let loads = || curve.iter().map(|point| point[1]);
+        let most = loads().fold(0.0, |m: f64, load| m.max(load.abs()));
+        let highest = loads().fold(f64::NEG_INFINITY, f64::max);
+        let is_test = self.moves_head || highest > curve[0][1] + HELD * most;
+        (!is_test).then(|| {
+            format!(
+                "the head moves by {:.6} m in phase `{}` under a load that does not rise: no load test",
+                largest(curve) - curve[0][0],
+                self.phase
+            )
+        })
     }
 }
 
@@ -75,7 +94,7 @@ pub struct Criterion {
 /// The resistances of a pile, net loads of its head in kN.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Resistances {
-    /// The last phase that pushes the head down.
+    /// The last load test that pushes the head down.
     pub phase: Option<String>,
     /// Unit of the loads.
     pub unit: &'static str,
@@ -118,7 +137,7 @@ impl Curve {
     pub(crate) fn phase(
         &mut self,
         phase: &str,
-        [resets, is_in_place]: [bool; 2],
+        [resets, is_in_place, moves_head]: [bool; 3],
         stiffness: Option<f64>,
     ) {
         let before = self.phases.last();
@@ -132,6 +151,7 @@ impl Curve {
             phase: phase.to_owned(),
             resets,
             is_in_place,
+            moves_head,
             stiffness,
             gross_start,
             start,
@@ -159,11 +179,12 @@ impl Curve {
         self.phases.iter().rev().filter(|phase| phase.is_in_place)
     }
 
-    /// The last phase that ends with the head lower than it began.
+    /// The last load test that ends with the head lower than it began.
     fn last_push(&self) -> Option<&OfPhase> {
         let moves = |phase: &&OfPhase| {
             let end = phase.points.last();
             end.is_some_and(|end| end[0] > phase.start[0])
+                && phase.no_test(&phase.curve(1.0)).is_none()
         };
         self.in_place().find(moves)
     }
@@ -180,7 +201,7 @@ impl Curve {
             .collect()
     }
 
-    /// The last phase whose curve in a direction reaches a criterion: `find` gives its load there, or what is missing.
+    /// The last load test whose curve in a direction reaches a criterion: `find` gives its load there, or what is missing.
     /// The reason is that of the phase which moves the head farthest.
     fn last_to_reach(
         &self,
@@ -194,7 +215,10 @@ impl Curve {
             if most <= curve[0][0] {
                 continue;
             }
-            match find(phase, &curve) {
+            let found = phase
+                .no_test(&curve)
+                .map_or_else(|| find(phase, &curve), Err);
+            match found {
                 Ok([_, head, shaft, base]) => {
                     return Ok(Criterion {
                         phase: phase.phase.clone(),
@@ -304,7 +328,7 @@ impl Curve {
             ten_percent: at_ten_percent(1.0).map_err(with_uplift),
             davisson: by_davisson(1.0),
             chin: push
-                .ok_or_else(|| "the head moves down in no phase with the pile in place".to_owned())
+                .ok_or_else(|| "no phase with the pile in place pushes the head down".to_owned())
                 .and_then(|phase| chin(&self.since_reset(phase))),
             uplift_ten_percent: at_ten_percent(-1.0),
             uplift_davisson: by_davisson(-1.0),

@@ -27,21 +27,7 @@ impl Downdrag {
             max_axial_force: forces.fold(f64::NEG_INFINITY, f64::max),
             ..Self::default()
         };
-        let stresses = stations
-            .iter()
-            .flat_map(|station| [station.shaft_friction, station.normal_stress]);
-        let largest = stresses.flatten().fold(0.0, |m: f64, v| m.max(v.abs()));
-        let friction: Vec<f64> = stations
-            .iter()
-            .map(|station| {
-                let value = station.shaft_friction.unwrap_or(0.0);
-                if value.abs() > NONE * largest {
-                    value
-                } else {
-                    0.0
-                }
-            })
-            .collect();
+        let friction = friction(stations);
         let length: f64 = spans
             .iter()
             .filter(|span| !span.is_gap())
@@ -76,6 +62,19 @@ impl Downdrag {
         }
         none
     }
+}
+
+/// Friction at each station, without round-off.
+fn friction(stations: &[Station]) -> Vec<f64> {
+    let stresses = stations
+        .iter()
+        .flat_map(|station| [station.shaft_friction, station.normal_stress]);
+    let largest = stresses.flatten().fold(0.0, |m: f64, v| m.max(v.abs()));
+    let of = |station: &Station| {
+        let value = station.shaft_friction;
+        value.filter(|value| value.abs() > NONE * largest)
+    };
+    stations.iter().map(|s| of(s).unwrap_or(0.0)).collect()
 }
 
 /// Area of the shaft between a row and the next, m².

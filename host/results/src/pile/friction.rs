@@ -99,6 +99,17 @@ fn average(
     all
 }
 
+fn weighted_mean(weights: &[f64], values: &[Skin]) -> Skin {
+    let whole: f64 = weights.iter().sum();
+    std::array::from_fn(|i| {
+        let weighted = weights.iter().zip(values);
+        weighted
+            .map(|(weight, value)| weight * value[i])
+            .sum::<f64>()
+            / whole
+    })
+}
+
 /// An element of the shaft between two heights. `pressed`: the force that it takes of the pile.
 fn of_facet(
     snapshot: &Snapshot<'_>,
@@ -121,19 +132,8 @@ fn of_facet(
         [facet.sign * traction[1], -traction[0], facet.sign * jump[1]]
     };
     let values: Vec<Skin> = points.clone().map(at).collect();
-    let weights: Vec<f64> = points
-        .clone()
-        .map(|point| kinematics.weight(point))
-        .collect();
-    let whole: f64 = weights.iter().sum();
-    let mean = |i: usize| {
-        let weighted = weights.iter().zip(&values);
-        weighted
-            .map(|(weight, value)| weight * value[i])
-            .sum::<f64>()
-            / whole
-    };
-    let mut mean: Skin = std::array::from_fn(mean);
+    let weights = points.clone().map(|point| kinematics.weight(point));
+    let mut mean = weighted_mean(&weights.collect::<Vec<f64>>(), &values);
     if group.is_active {
         mean[0] += left;
     }

@@ -119,81 +119,32 @@ impl Geometry {
     pub(super) fn new(parts: &Parts, simulation: &Simulation) -> Result<Self, Misfit> {
         let problem = simulation.problem();
         let (mesh, groups) = (&problem.mesh, simulation.groups());
-        let mut own: HashSet<usize> = HashSet::new();
-        // Element of the pile by the middle of each of its sides.
-        let mut by_side: HashMap<usize, Vec<(usize, usize)>> = HashMap::new();
-        for (number, &group) in parts.groups.iter().enumerate() {
-            if is_interface(&groups[group]) {
-                return Err(Misfit::NotSolid(number));
-            }
-            let kinematics = &groups[group].kinematics;
-            for element in 0..kinematics.n_elements() {
-                own.extend(kinematics.nodes(element));
-                for [_, _, middle] in sides(kinematics.nodes(element), false) {
-                    by_side.entry(middle).or_default().push((group, element));
-                }
-            }
-        }
-        let of_line = |line: &Line| -> Vec<usize> {
-            let places: HashSet<[u64; 2]> = line.nodes.iter().map(|&n| place(mesh, n)).collect();
-            let mut nodes: Vec<usize> = own
-                .iter()
-                .copied()
-                .filter(|&node| places.contains(&place(mesh, node)))
-                .collect();
-            nodes.sort_unstable();
-            nodes
-        };
+        let (own, by_side) = elements(parts, groups)?;
+        let of_line = |line: &Line| at_line(mesh, line, &own);
         let line = |name: &str| mesh.lines.get(name);
         let head = line(&parts.head).map(of_line).unwrap_or_default();
         if head.is_empty() {
             return Err(Misfit::Head);
         }
         let facets = |of: &[usize]| facets(problem.analysis, mesh, groups, of, &own, &by_side);
-        for (number, &group) in parts.shaft.iter().enumerate() {
-            if !is_interface(&groups[group]) {
-                return Err(Misfit::NotAnInterface(number));
-            }
-        }
-        let shaft = facets(&parts.shaft);
-        let touches = |group: &usize| shaft.iter().any(|facet| facet.group == *group);
-        if let Some(apart) = parts.shaft.iter().position(|group| !touches(group)) {
-            return Err(Misfit::ApartFromShaft(apart));
-        }
-        let base = base(
-            parts,
-            groups,
-            |name| line(name).map(of_line),
-            facets,
-            &by_side,
-        )?;
+        let shaft = shaft(parts, groups, facets)?;
+        let at = |name: &str| line(name).map(of_line);
+        let base = base(parts, groups, at, facets, &by_side)?;
         if base.is_empty() {
             return Err(Misfit::Base);
         }
-        let heights = |nodes: &[usize]| {
-            let at = nodes.iter().map(|&node| mesh.nodes[node][1]);
-            at.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], z| {
-                [a.min(z), b.max(z)]
-            })
-        };
-        let (top, bottom) = (heights(&head)[1], heights(&base)[0]);
+        let (top, bottom) = (extent(mesh, &head, 1)[1], extent(mesh, &base, 1)[0]);
         if top <= bottom {
             return Err(Misfit::UpsideDown);
         }
         let spans = Span::all([top, bottom], &shaft, problem);
         let rows = rows(mesh, &spans, &shaft, [&head, &base]);
-        let special: HashSet<usize> = shaft
-            .iter()
-            .flat_map(|facet| facet.nodes)
-            .chain(head.iter().copied())
-            .chain(base.iter().copied())
-            .collect();
+        let special = shaft.iter().flat_map(|facet| facet.nodes);
+        let special = special.chain(head.iter().chain(&base).copied());
+        let special: HashSet<usize> = special.collect();
         let mut others: Vec<usize> = own.difference(&special).copied().collect();
         others.sort_unstable();
-        let x = base.iter().map(|&node| mesh.nodes[node][0]);
-        let [left, right] = x.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| {
-            [a.min(x), b.max(x)]
-        });
+        let [left, right] = extent(mesh, &base, 0);
         let width = match problem.analysis {
             Analysis::Axisymmetric => 2.0 * right,
             Analysis::PlaneStrain => right - left,
@@ -360,6 +311,93 @@ fn bodies(
     (bodies, head_sides)
 }
 
+/// Nodes of the pile's elements, and an element by the middle of each of its sides.
+type Elements = (HashSet<usize>, HashMap<usize, Vec<(usize, usize)>>);
+
+fn elements(parts: &Parts, groups: &[Group]) -> Result<Elements, Misfit> {
+    let (mut own, mut by_side) = Elements::default();
+    for (number, &group) in parts.groups.iter().enumerate() {
+        if is_interface(&groups[group]) {
+            return Err(Misfit::NotSolid(number));
+        }
+        let kinematics = &groups[group].kinematics;
+        for element in 0..kinematics.n_elements() {
+            own.extend(kinematics.nodes(element));
+            for [_, _, middle] in sides(kinematics.nodes(element), false) {
+                by_side.entry(middle).or_default().push((group, element));
+            }
+        }
+    }
+    Ok((own, by_side))
+}
+
+/// Nodes of the pile at a line.
+fn at_line(mesh: &Mesh, line: &Line, own: &HashSet<usize>) -> Vec<usize> {
+    let places: HashSet<[u64; 2]> = line.nodes.iter().map(|&n| place(mesh, n)).collect();
+    let there = own.iter().copied();
+    let there = there.filter(|&node| places.contains(&place(mesh, node)));
+    let mut nodes: Vec<usize> = there.collect();
+    nodes.sort_unstable();
+    nodes
+}
+
+/// What touches the pile of the interfaces along its shaft.
+fn shaft(
+    parts: &Parts,
+    groups: &[Group],
+    facets: impl Fn(&[usize]) -> Vec<Facet>,
+) -> Result<Vec<Facet>, Misfit> {
+    let of = &parts.shaft;
+    if let Some(other) = of.iter().position(|&group| !is_interface(&groups[group])) {
+        return Err(Misfit::NotAnInterface(other));
+    }
+    let shaft = facets(of);
+    let touches = |group: &usize| shaft.iter().any(|facet| facet.group == *group);
+    match of.iter().position(|group| !touches(group)) {
+        Some(apart) => Err(Misfit::ApartFromShaft(apart)),
+        None => Ok(shaft),
+    }
+}
+
+/// Smallest and largest coordinate of nodes, m.
+fn extent(mesh: &Mesh, nodes: &[usize], c: usize) -> [f64; 2] {
+    let at = nodes.iter().map(|&node| mesh.nodes[node][c]);
+    at.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| {
+        [a.min(v), b.max(v)]
+    })
+}
+
+/// Place of a node from the middle of an element's nodes.
+fn off_middle(mesh: &Mesh, nodes: &[usize], node: usize) -> [f64; 2] {
+    [0, 1].map(|c| {
+        let sum: f64 = nodes.iter().map(|&n| mesh.nodes[n][c]).sum();
+        mesh.nodes[node][c] - sum / nodes.len() as f64
+    })
+}
+
+/// Area of a side between two points, m²; plane strain: per metre.
+fn area(analysis: Analysis, ends: [[f64; 2]; 2]) -> f64 {
+    let length = (ends[1][0] - ends[0][0]).hypot(ends[1][1] - ends[0][1]);
+    length
+        * match analysis {
+            Analysis::Axisymmetric => PI * (ends[0][0] + ends[1][0]),
+            Analysis::PlaneStrain => 1.0,
+        }
+}
+
+/// The first colour that no element at these nodes has; it is theirs from now on.
+fn colour(nodes: &[usize], colours: &mut HashMap<usize, Vec<usize>>) -> usize {
+    let taken = nodes.iter().filter_map(|node| colours.get(node));
+    let taken: Vec<usize> = taken.flatten().copied().collect();
+    let mut all = 0..=taken.len();
+    let free = all.find(|colour| !taken.contains(colour));
+    let free = free.unwrap_or_default();
+    for &node in nodes {
+        colours.entry(node).or_default().push(free);
+    }
+    free
+}
+
 /// Elements of interface groups that touch the pile.
 fn facets(
     analysis: Analysis,
@@ -389,33 +427,11 @@ fn facets(
             let is_minus = if is_joint {
                 side == sides[0]
             } else {
-                let middle = |c: usize| {
-                    nodes.iter().map(|&n| mesh.nodes[n][c]).sum::<f64>() / nodes.len() as f64
-                };
-                let arm = [0, 1].map(|c| mesh.nodes[side[2]][c] - middle(c));
-                arm[0] * axes.across[0] + arm[1] * axes.across[1] < 0.0
+                let off = off_middle(mesh, nodes, side[2]);
+                off[0] * axes.across[0] + off[1] * axes.across[1] < 0.0
             };
             let up = if axes.along[1] < 0.0 { -1.0 } else { 1.0 };
             let ends = [side[0], side[1]].map(|node| mesh.nodes[node]);
-            let length = (ends[1][0] - ends[0][0]).hypot(ends[1][1] - ends[0][1]);
-            let area = length
-                * match analysis {
-                    Analysis::Axisymmetric => PI * (ends[0][0] + ends[1][0]),
-                    Analysis::PlaneStrain => 1.0,
-                };
-            let taken: Vec<usize> = nodes
-                .iter()
-                .filter_map(|node| colours.get(node))
-                .flatten()
-                .copied()
-                .collect();
-            let mut colours_left = 0..=taken.len();
-            let colour = colours_left
-                .find(|colour| !taken.contains(colour))
-                .unwrap_or_default();
-            for &node in nodes {
-                colours.entry(node).or_default().push(colour);
-            }
             facets.push(Facet {
                 number: facets.len(),
                 group: number,
@@ -424,9 +440,9 @@ fn facets(
                 opposite: is_joint.then(|| sides[usize::from(is_minus)]),
                 sign: if is_minus { up } else { -up },
                 z: [ends[0][1].min(ends[1][1]), ends[0][1].max(ends[1][1])],
-                area,
+                area: area(analysis, ends),
                 beside: by_side[&side[2]][0],
-                colour,
+                colour: colour(nodes, &mut colours),
             });
         }
     }

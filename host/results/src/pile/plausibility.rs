@@ -3,6 +3,7 @@
 use super::compliance::is_transfer;
 use super::geometry::{SAME, sides};
 use super::{Base, Pile};
+use mechanics::group::Group;
 use mechanics::problem::{Analysis, Axis, Formulation, Phase};
 use mechanics::{Problem, Simulation};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -11,6 +12,8 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 /// soft, below the second its jumps are lost in round-off.
 const SOFT: f64 = 1.0;
 const STIFF: f64 = 1e-8;
+/// Stress over a pile's section that no material of piles carries, kPa.
+const STRONGEST: f64 = 1e6;
 
 impl Pile {
     /// Warnings about the pile before it is loaded.
@@ -23,6 +26,7 @@ impl Pile {
         said.extend(self.soft(simulation));
         said.extend(self.loaded_too_early(simulation.problem()));
         said.extend(self.only_pulled(simulation.problem()));
+        said.extend(self.crushed(simulation.problem()));
         said
     }
 
@@ -51,10 +55,33 @@ impl Pile {
         })
     }
 
+    /// Constrained and shear modulus of the stiffest ground beside an interface, kPa.
+    fn stiffest_beside(&self, groups: &[Group], joint: usize) -> [f64; 2] {
+        let joint = &groups[joint].kinematics;
+        let own = (0..joint.n_elements()).flat_map(|element| joint.nodes(element));
+        let own: BTreeSet<usize> = own.copied().collect();
+        let is_beside = |group: &Group| {
+            let kinematics = &group.kinematics;
+            // A side has three nodes; a corner alone is not beside it.
+            (0..kinematics.n_elements()).any(|element| {
+                let nodes = kinematics.nodes(element).iter();
+                nodes.filter(|node| own.contains(node)).count() >= 3
+            })
+        };
+        let ground = groups.iter().enumerate().filter(|(number, group)| {
+            group.formulation == Formulation::Solid
+                && !self.parts.groups.contains(number)
+                && is_beside(group)
+        });
+        let operators = ground.filter_map(|(_, group)| group.elastic_operator(0));
+        operators.fold([0.0_f64, 0.0_f64], |[m, g], d| {
+            [m.max(d[5]), g.max(0.5 * (d[5] - d[4]))]
+        })
+    }
+
     /// Interfaces that are as soft as a thick layer of the ground, or so stiff that their jumps are lost in round-off.
     fn soft(&self, simulation: &Simulation) -> Vec<String> {
         let groups = simulation.groups();
-        let operator = |number: usize| groups[number].elastic_operator(0);
         let diameter = self.diameter();
         let mut said = Vec::new();
         let is_joint = |joint: &usize| {
@@ -62,29 +89,11 @@ impl Pile {
             group.formulation == Formulation::ZeroThickness && !is_transfer(group)
         };
         for joint in self.joints().filter(is_joint) {
-            let nodes_of = |number: usize| {
-                let kinematics = &groups[number].kinematics;
-                (0..kinematics.n_elements()).flat_map(|element| kinematics.nodes(element))
-            };
-            let own: BTreeSet<usize> = nodes_of(joint).copied().collect();
-            let is_ground = |number: &usize| {
-                groups[*number].formulation == Formulation::Solid
-                    && !self.parts.groups.contains(number)
-                    && {
-                        let kinematics = &groups[*number].kinematics;
-                        // A side has three nodes; a corner alone is not beside it.
-                        (0..kinematics.n_elements()).any(|element| {
-                            let nodes = kinematics.nodes(element).iter();
-                            nodes.filter(|node| own.contains(node)).count() >= 3
-                        })
-                    }
-            };
-            let ground = (0..groups.len()).filter(is_ground).filter_map(operator);
-            // Constrained and shear modulus of the stiffest ground there.
-            let [constrained, shear] = ground.fold([0.0_f64, 0.0_f64], |[m, g], d| {
-                [m.max(d[5]), g.max(0.5 * (d[5] - d[4]))]
-            });
-            let Some(stiffness) = operator(joint).filter(|_| constrained > 0.0) else {
+            let [constrained, shear] = self.stiffest_beside(groups, joint);
+            let Some(stiffness) = groups[joint]
+                .elastic_operator(0)
+                .filter(|_| constrained > 0.0)
+            else {
                 continue;
             };
             for (name, modulus, stiffness) in [
@@ -168,6 +177,17 @@ impl Pile {
         early.map(|(_, phase)| phase.name.clone()).collect()
     }
 
+    /// Names of the phases that prescribe the head's vertical displacement.
+    pub(crate) fn phases_that_move_the_head(&self, problem: &Problem) -> Vec<String> {
+        let head = &self.parts.head;
+        let moves = |phase: &&Phase| {
+            let mut inputs = phase.displacement.iter();
+            inputs.any(|input| input.line == *head && input.y.is_some())
+        };
+        let phases = problem.phases.iter().filter(moves);
+        phases.map(|phase| phase.name.clone()).collect()
+    }
+
     /// Vertical loads and displacements that a phase gives the head: greatest of either sign, upward positive.
     fn head_moves(&self, phase: &Phase) -> [f64; 2] {
         let head = &self.parts.head;
@@ -194,6 +214,24 @@ impl Pile {
             (self.head_moves(phase) != [0.0, 0.0]).then(|| {
                 format!(
                     "[pile]: phase `{}` loads the head, but {why}; no resistance is reported from this phase",
+                    phase.name
+                )
+            })
+        })
+    }
+
+    /// A force on the head that no material of a pile could carry.
+    fn crushed(&self, problem: &Problem) -> Option<String> {
+        let sides = self.geometry.head_sides.iter();
+        let area: f64 = sides.map(|(area, ..)| area).sum();
+        problem.phases.iter().find_map(|phase| {
+            let force = self.force_on_head(phase)?.abs();
+            let stress = force / area;
+            let unit = self.geometry.analysis.force_unit();
+            (stress > STRONGEST).then(|| {
+                format!(
+                    "[pile]: phase `{}` puts a force of {force} {unit} on the head, {stress:.1e} kPa over its section; concrete \
+                     carries 3e4, steel 4e5: was it typed in N?",
                     phase.name
                 )
             })

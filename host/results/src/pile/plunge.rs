@@ -11,11 +11,14 @@ const MANY: f64 = 20.0;
 
 impl Pile {
     /// At which net load of the head a phase of forces found no further equilibrium, what gives way and what to do, in
-    /// one sentence. `None` unless the phase changes a force on the head along a straight ramp.
+    /// one sentence. `None` unless the pile is in place and the phase changes a force on its head along a straight ramp.
     pub(crate) fn plunge(&self, simulation: &Simulation, none: &NoEquilibrium) -> Option<String> {
         let problem = simulation.problem();
         let mut names = problem.phases.iter().map(|phase| &phase.name);
         let number = names.position(|name| *name == none.place.phase)?;
+        if self.not_in_place(problem, number).is_some() {
+            return None;
+        }
         let phase = &problem.phases[number];
         let end = self
             .force_on_head(phase)
@@ -47,7 +50,7 @@ impl Pile {
     }
 
     /// The vertical force that a phase puts on the head, if it does.
-    fn force_on_head(&self, phase: &Phase) -> Option<f64> {
+    pub(super) fn force_on_head(&self, phase: &Phase) -> Option<f64> {
         let forces = phase.force.iter();
         let mut own = forces.filter(|force| force.line == self.parts.head);
         own.find_map(|force| force.y)
@@ -90,24 +93,9 @@ impl Pile {
         let points = shaft
             .iter()
             .map(|&number| groups[number].kinematics.n_points());
-        let most_give = 2 * modes.len() > points.sum::<usize>();
         let worst_of_shaft = worst.filter(|_| shaft.iter().any(|&number| is_at(number)));
-        let slide = modes
-            .iter()
-            .filter(|mode| **mode == FailureMode::Slides)
-            .count();
-        let opens = match worst_of_shaft.map(|worst| worst.how) {
-            Some(how) if !most_give => matches!(how, FailureMode::Opens | FailureMode::BondBreaks),
-            _ => 2 * slide < modes.len(),
-        };
-        let mut said = Vec::new();
-        if most_give || worst_of_shaft.is_some() {
-            said.push(if opens {
-                "the shaft opens"
-            } else {
-                "the shaft slides"
-            });
-        }
+        let of_shaft = of_shaft(&modes, points.sum(), worst_of_shaft);
+        let mut said = Vec::from_iter(of_shaft);
         let bears =
             |mode: FailureMode| !matches!(mode, FailureMode::Opens | FailureMode::BondBreaks);
         let is_below = match &self.parts.base {
@@ -130,4 +118,23 @@ impl Pile {
         }
         format!(": {}", said.join(" and "))
     }
+}
+
+/// What the shaft does, by the modes of its points that give way and by the worst failure if that is its.
+fn of_shaft(
+    modes: &[FailureMode],
+    n_points: usize,
+    worst: Option<&Mechanism>,
+) -> Option<&'static str> {
+    let most_give = 2 * modes.len() > n_points;
+    let slide = modes.iter().filter(|mode| **mode == FailureMode::Slides);
+    let opens = match worst.map(|worst| worst.how) {
+        Some(how) if !most_give => matches!(how, FailureMode::Opens | FailureMode::BondBreaks),
+        _ => 2 * slide.count() < modes.len(),
+    };
+    (most_give || worst.is_some()).then_some(if opens {
+        "the shaft opens"
+    } else {
+        "the shaft slides"
+    })
 }

@@ -21,6 +21,8 @@ pub(crate) struct Record {
     resets: Vec<String>,
     /// Phases before the pile is in place.
     too_early: Vec<String>,
+    /// Phases that prescribe the settlement of the head.
+    moving: Vec<String>,
 }
 
 /// How far it had come at a checkpoint.
@@ -53,6 +55,7 @@ impl Record {
             compliance: from.map(|kept| kept.compliance.clone()).unwrap_or_default(),
             resets: resets.map(|phase| phase.name.clone()).collect(),
             too_early: pile.phases_too_early(simulation.problem()),
+            moving: pile.phases_that_move_the_head(simulation.problem()),
             pile,
         })
     }
@@ -100,9 +103,10 @@ impl Record {
         if self.curve.begins(&place.phase) {
             let resets = self.resets.contains(&place.phase);
             let is_in_place = !self.too_early.contains(&place.phase);
+            let moves_head = self.moving.contains(&place.phase);
             let stiffness = self.pile.stiffness(snapshot.groups);
-            self.curve
-                .phase(&place.phase, [resets, is_in_place], stiffness);
+            let of_phase = [resets, is_in_place, moves_head];
+            self.curve.phase(&place.phase, of_phase, stiffness);
             if is_in_place {
                 self.compliance = self.pile.compliance(snapshot.groups);
             } else {

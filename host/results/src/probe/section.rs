@@ -63,6 +63,27 @@ fn of_solids(mesh: &Mesh, line: &Line, number: usize) -> Option<Section> {
     Some(Section { elements, nodes })
 }
 
+/// Elements that are reached around a node from those in `queue`, across the edges in `beside`.
+fn around(
+    mesh: &Mesh,
+    node: usize,
+    mut queue: Vec<usize>,
+    beside: &HashMap<usize, Vec<usize>>,
+) -> HashSet<usize> {
+    let mut around: HashSet<usize> = queue.iter().copied().collect();
+    while let Some(solid) = queue.pop() {
+        let own = mesh.solids[solid].edges();
+        for [_, _, middle] in own.filter(|[a, b, _]| [a, b].contains(&&node)) {
+            for &next in beside.get(&middle).into_iter().flatten() {
+                if around.insert(next) {
+                    queue.push(next);
+                }
+            }
+        }
+    }
+    around
+}
+
 /// Elements of a group on the side of a line that `edges` belong to; `other` are the edges of the other
 /// side. The elements have an edge on the line or, as some triangles, only a node. Around a node at which
 /// the line ends within the group the sides are not separate: only elements next to the line count there.
@@ -95,18 +116,7 @@ fn on_the_side(
     for &node in &on_line {
         let at_node = |edge: &&(usize, usize)| ends(edge).contains(&node);
         let first = edges.iter().filter(at_node).map(|(solid, _)| *solid);
-        let mut queue: Vec<usize> = first.collect();
-        let mut around: HashSet<usize> = queue.iter().copied().collect();
-        while let Some(solid) = queue.pop() {
-            let own = mesh.solids[solid].edges();
-            for [_, _, middle] in own.filter(|[a, b, _]| [a, b].contains(&&node)) {
-                for &next in beside.get(&middle).into_iter().flatten() {
-                    if around.insert(next) {
-                        queue.push(next);
-                    }
-                }
-            }
-        }
+        let around = around(mesh, node, first.collect(), &beside);
         let comes_around = other
             .iter()
             .filter(at_node)

@@ -52,22 +52,13 @@ struct Grid {
 impl Fields {
     /// Reads the fields in a folder, as far as they can be read and the page can hold them.
     pub(super) fn read(folder: &Path, budget: &Budget, notes: &mut Vec<String>) -> Option<Self> {
-        let list = match std::fs::read_to_string(folder.join("fields.pvd")) {
-            Ok(list) => list,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return None,
-            Err(error) => {
-                notes.push(format!("fields.pvd: {error}"));
-                return None;
-            }
+        let list = list(folder, notes)?;
+        let entries = list.split("<DataSet ").skip(1);
+        let of_entry = |entry| {
+            let time = attribute(entry, "timestep")?.parse().ok()?;
+            Some((time, attribute(entry, "file")?))
         };
-        let files: Vec<(f64, &str)> = list
-            .split("<DataSet ")
-            .skip(1)
-            .filter_map(|entry| {
-                let time = attribute(entry, "timestep")?.parse().ok()?;
-                Some((time, attribute(entry, "file")?))
-            })
-            .collect();
+        let files: Vec<(f64, &str)> = entries.filter_map(of_entry).collect();
         let mut fields: Option<Self> = None;
         let mut shown = vec![true; files.len()];
         for (number, (time, file)) in files.iter().enumerate() {
@@ -220,23 +211,10 @@ impl Grid {
             Ok(values) => numbers(values)?,
             Err(_) => vec![1; group.len()],
         };
-        let mut fields = Vec::new();
-        for (name, values) in arrays(data) {
-            if !["group", "active"].contains(&name) {
-                fields.push((name.to_owned(), numbers(values)?));
-            }
-        }
-        let mut start = 0;
-        let mut all = Vec::new();
-        for &end in &offsets {
-            let cell = connectivity.get(start..end).ok_or("its cells do not fit")?;
-            let is_known = cell_type(cell.len()).is_some();
-            if !is_known || cell.iter().any(|&node| 2 * node >= nodes.len()) {
-                return Err("a cell is no quadratic quad, triangle or edge of the mesh".to_owned());
-            }
-            all.push(cell.to_vec());
-            start = end;
-        }
+        let others = arrays(data).filter(|(name, _)| !["group", "active"].contains(name));
+        let field = |(name, values): (&str, &str)| Ok((name.to_owned(), numbers(values)?));
+        let fields: Vec<(String, Vec<f64>)> = others.map(field).collect::<Result<_, String>>()?;
+        let all = cells_of(&connectivity, &offsets, nodes.len() / 2)?;
         let n = all.len();
         let fits = group.len() == n
             && active.len() == n
@@ -245,10 +223,7 @@ impl Grid {
         if !fits || displacement.len() != nodes.len() || group.iter().any(|&g| g > n) {
             return Err("its arrays have different lengths".to_owned());
         }
-        let cells = group
-            .iter()
-            .zip(&active)
-            .filter(|(_, active)| **active == 0);
+        let cells = group.iter().zip(&active).filter(|(_, on)| **on == 0);
         let mut inactive: Vec<usize> = cells.map(|(group, _)| *group).collect();
         inactive.sort_unstable();
         inactive.dedup();
@@ -264,6 +239,38 @@ impl Grid {
 }
 
 /// The value of an attribute in a tag.
+/// The list of the files, if there is one that can be read.
+fn list(folder: &Path, notes: &mut Vec<String>) -> Option<String> {
+    match std::fs::read_to_string(folder.join("fields.pvd")) {
+        Ok(list) => Some(list),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => None,
+        Err(error) => {
+            notes.push(format!("fields.pvd: {error}"));
+            None
+        }
+    }
+}
+
+/// Nodes of each cell.
+fn cells_of(
+    connectivity: &[usize],
+    offsets: &[usize],
+    n_nodes: usize,
+) -> Result<Vec<Vec<usize>>, String> {
+    let mut start = 0;
+    let mut cells = Vec::new();
+    for &end in offsets {
+        let cell = connectivity.get(start..end).ok_or("its cells do not fit")?;
+        let is_known = cell_type(cell.len()).is_some();
+        if !is_known || cell.iter().any(|&node| node >= n_nodes) {
+            return Err("a cell is no quadratic quad, triangle or edge of the mesh".to_owned());
+        }
+        cells.push(cell.to_vec());
+        start = end;
+    }
+    Ok(cells)
+}
+
 fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
     let tag = &tag[..tag.find('>').unwrap_or(tag.len())];
     let (_, rest) = tag.split_once(&format!("{name}=\""))?;

@@ -235,7 +235,6 @@ fn loads(analysis: Analysis, phase: &Phase) -> Vec<Load> {
         let given = given.filter_map(|(value, name)| Some(format!("{name} {} {unit}", value?)));
         given.collect::<Vec<_>>().join(", ")
     };
-    let towards = |x: Option<f64>, y: Option<f64>| Some([x.unwrap_or(0.0), y.unwrap_or(0.0)]);
     let mut loads = Vec::new();
     for pressure in &phase.pressure {
         let (low, high) = ends(&pressure.value);
@@ -249,18 +248,14 @@ fn loads(analysis: Analysis, phase: &Phase) -> Vec<Load> {
             ..load(&pressure.line, "pressure", text)
         });
     }
-    for force in &phase.force {
-        let text = components(force.x, force.y, analysis.force_unit());
+    let forces = phase.force.iter();
+    let forces = forces.map(|f| ((&f.line, f.x, f.y), "force", analysis.force_unit()));
+    let moved = phase.displacement.iter();
+    let moved = moved.map(|u| ((&u.line, u.x, u.y), "displacement", "m"));
+    for ((line, x, y), kind, unit) in forces.chain(moved) {
         loads.push(Load {
-            towards: towards(force.x, force.y),
-            ..load(&force.line, "force", text)
-        });
-    }
-    for given in &phase.displacement {
-        let text = components(given.x, given.y, "m");
-        loads.push(Load {
-            towards: towards(given.x, given.y),
-            ..load(&given.line, "displacement", text)
+            towards: Some([x.unwrap_or(0.0), y.unwrap_or(0.0)]),
+            ..load(line, kind, components(x, y, unit))
         });
     }
     for free in &phase.free {

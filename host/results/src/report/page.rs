@@ -226,6 +226,17 @@ fn drawn((run, figures): (&Run, Vec<Figure>)) -> Drawn<'_> {
     }
 }
 
+/// How a run ended, whether that is no success, and why.
+fn standing(run: &Run, is_running: bool) -> (String, bool, String) {
+    match run.ending() {
+        Ending::Unfinished(_) if is_running => ("running".to_owned(), false, String::new()),
+        Ending::Done => ("done".to_owned(), false, String::new()),
+        Ending::NotRun => ("dry run: nothing computed".to_owned(), false, String::new()),
+        Ending::Failed(status, reason) => (status, true, reason),
+        Ending::Unfinished(why) => ("unfinished".to_owned(), true, why.to_owned()),
+    }
+}
+
 fn run_context(run: &Run, folder: &Path, is_running: bool) -> Template {
     let Summary {
         head,
@@ -233,13 +244,7 @@ fn run_context(run: &Run, folder: &Path, is_running: bool) -> Template {
         seconds: took,
         ..
     } = &run.summary;
-    let (status, failed, reason) = match run.ending() {
-        Ending::Unfinished(_) if is_running => ("running".to_owned(), false, String::new()),
-        Ending::Done => ("done".to_owned(), false, String::new()),
-        Ending::NotRun => ("dry run: nothing computed".to_owned(), false, String::new()),
-        Ending::Failed(status, reason) => (status, true, reason),
-        Ending::Unfinished(why) => ("unfinished".to_owned(), true, why.to_owned()),
-    };
+    let (status, failed, reason) = standing(run, is_running);
     let last = run
         .history
         .ends
@@ -376,29 +381,42 @@ fn ends(run: &Run) -> Template {
     context! { phases, probes }
 }
 
+/// A load with what shaft and base have of it, and the phase.
+fn load_in_words(
+    load: f64,
+    unit: &str,
+    [shaft, base]: [Option<f64>; 2],
+    phase: Option<&str>,
+) -> String {
+    let split = shaft.zip(base).map_or_else(String::new, |(shaft, base)| {
+        format!(", of it shaft {shaft:.1} and base {base:.1}")
+    });
+    let phase = phase.map_or_else(String::new, |phase| format!(" (phase {phase})"));
+    format!("{load:.1} {unit}{split}{phase}")
+}
+
 /// Criteria of a pile's resistance: name, load or why none exists.
 fn resistances(pile: &Resistances) -> Vec<(String, String)> {
     let of = pile
         .diameter
         .map_or_else(String::new, |diameter| format!(", D = {diameter:.4} m"));
-    let split = |load: Option<f64>, [shaft, base]: [Option<f64>; 2], phase: &Option<String>| {
-        let load = load.map(|load| format!("{load:.1} {}", pile.unit))?;
-        let split = shaft.zip(base).map_or_else(String::new, |(shaft, base)| {
-            format!(", of it shaft {shaft:.1} and base {base:.1}")
-        });
-        let phase = phase.as_ref();
-        let phase = phase.map_or_else(String::new, |phase| format!(" (phase {phase})"));
-        Some(format!("{load}{split}{phase}"))
+    let split = |load: Option<f64>, parts: [Option<f64>; 2], phase: &Option<String>| {
+        Some(load_in_words(load?, &pile.unit, parts, phase.as_deref()))
     };
+    let of_ten_percent = [
+        pile.resistance_10_percent_diameter_shaft,
+        pile.resistance_10_percent_diameter_base,
+    ];
+    let of_davisson = [
+        pile.resistance_davisson_shaft,
+        pile.resistance_davisson_base,
+    ];
     let criteria = [
         (
             format!("at a settlement of D/10{of}"),
             split(
                 pile.resistance_10_percent_diameter,
-                [
-                    pile.resistance_10_percent_diameter_shaft,
-                    pile.resistance_10_percent_diameter_base,
-                ],
+                of_ten_percent,
                 &pile.resistance_10_percent_diameter_phase,
             ),
             &pile.resistance_10_percent_diameter_reason,
@@ -407,10 +425,7 @@ fn resistances(pile: &Resistances) -> Vec<(String, String)> {
             format!("by Davisson{of}"),
             split(
                 pile.resistance_davisson,
-                [
-                    pile.resistance_davisson_shaft,
-                    pile.resistance_davisson_base,
-                ],
+                of_davisson,
                 &pile.resistance_davisson_phase,
             ),
             &pile.resistance_davisson_reason,

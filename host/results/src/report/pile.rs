@@ -35,6 +35,74 @@ pub(super) struct Pile {
     values: Vec<Vec<Vec<Short>>>,
 }
 
+/// The rows of a table, increment by increment.
+struct Rows {
+    phases: Vec<String>,
+    /// Stations of the first increment, m.
+    z: Vec<f64>,
+    blocks: Blocks,
+    /// Phase and increment whose rows are being read, with stations and values so far.
+    now: Option<(usize, usize)>,
+    stations: Vec<f64>,
+    values: Vec<f64>,
+}
+
+impl Rows {
+    fn read(path: &Path, budget: &Budget, notes: &mut Vec<String>) -> Result<Self, Error> {
+        let table = Table::open(path, &COLUMNS)?;
+        let at = COLUMNS.map(|name| table.position(name).unwrap_or_default());
+        let [phase_at, increment_at, z_at, ..] = at;
+        let quantities = &at[3..];
+        let mut rows = Self {
+            phases: Vec::new(),
+            z: Vec::new(),
+            blocks: Blocks {
+                width: quantities.len(),
+                ..Blocks::default()
+            },
+            now: None,
+            stations: Vec::new(),
+            values: Vec::new(),
+        };
+        table.rows(notes, |row| {
+            let increment = row.count(increment_at).unwrap_or_default();
+            let phase = rows.phases.last().map(String::as_bytes);
+            let is_new_phase = phase != Some(row.bytes(phase_at));
+            if is_new_phase || rows.now.is_none_or(|(_, last)| last != increment) {
+                rows.end_increment(budget);
+                if is_new_phase {
+                    rows.phases.push(row.text(phase_at));
+                }
+                rows.now = Some((rows.phases.len() - 1, increment));
+            }
+            rows.stations.push(row.number(z_at));
+            let values = quantities.iter().map(|&column| row.number(column));
+            rows.values.extend(values);
+        })?;
+        rows.end_increment(budget);
+        Ok(rows)
+    }
+
+    fn end_increment(&mut self, budget: &Budget) {
+        let Some((phase, increment)) = self.now else {
+            return;
+        };
+        let blocks = &mut self.blocks;
+        if self.z.is_empty() {
+            self.z.clone_from(&self.stations);
+            let size = self.z.len() * blocks.width;
+            blocks.most = AHEAD * (budget.pile / size.max(1)).max(1);
+        }
+        if self.stations == self.z {
+            blocks.add(phase, increment, std::mem::take(&mut self.values));
+        } else {
+            blocks.n_broken += 1;
+        }
+        self.stations.clear();
+        self.values.clear();
+    }
+}
+
 impl Pile {
     /// Reads a table. `None` if there is nothing to show.
     ///
@@ -46,61 +114,14 @@ impl Pile {
         budget: &Budget,
         notes: &mut Vec<String>,
     ) -> Result<Option<Self>, Error> {
-        let table = Table::open(path, &COLUMNS)?;
-        let at = COLUMNS.map(|name| table.position(name).unwrap_or_default());
-        let [phase_at, increment_at, z_at, ..] = at;
-        let quantities = &at[3..];
-        let width = quantities.len();
-        let mut phases: Vec<String> = Vec::new();
-        let mut z: Vec<f64> = Vec::new();
-        let mut blocks = Blocks {
-            width,
-            ..Blocks::default()
-        };
-        // The increment whose rows are being read, with its stations and values.
-        let mut now: Option<(usize, usize)> = None;
-        let (mut stations, mut values) = (Vec::new(), Vec::new());
-        let mut end =
-            |now: Option<(usize, usize)>, stations: &mut Vec<f64>, values: &mut Vec<f64>| {
-                let Some((phase, increment)) = now else {
-                    return;
-                };
-                if z.is_empty() {
-                    z.clone_from(stations);
-                    blocks.most = AHEAD * (budget.pile / (z.len() * width).max(1)).max(1);
-                }
-                if *stations == z {
-                    blocks.add(phase, increment, std::mem::take(values));
-                } else {
-                    blocks.n_broken += 1;
-                }
-                stations.clear();
-                values.clear();
-            };
-        table.rows(notes, |row| {
-            let increment = row.count(increment_at).unwrap_or_default();
-            let is_new_phase = phases.last().map(String::as_bytes) != Some(row.bytes(phase_at));
-            if is_new_phase || now.is_none_or(|(_, last)| last != increment) {
-                end(now, &mut stations, &mut values);
-                if is_new_phase {
-                    phases.push(row.text(phase_at));
-                }
-                now = Some((phases.len() - 1, increment));
-            }
-            stations.push(row.number(z_at));
-            values.extend(quantities.iter().map(|&column| row.number(column)));
-        })?;
-        end(now, &mut stations, &mut values);
+        let Rows {
+            phases, z, blocks, ..
+        } = Rows::read(path, budget, notes)?;
+        let width = blocks.width;
         if z.is_empty() {
             return Ok(None);
         }
-        if blocks.n_broken > 0 {
-            notes.push(format!(
-                "pile.csv: {} of {} increments are not complete and left out",
-                blocks.n_broken,
-                blocks.n + blocks.n_broken
-            ));
-        }
+        notes.extend(blocks.incomplete("pile.csv"));
         let most = budget.pile / (z.len() * width).max(1);
         let must = |i: usize| blocks.kept[i].ends_phase;
         let shown = thinned(blocks.kept.len(), most, must);

@@ -121,6 +121,28 @@ impl Blocks {
         }
     }
 
+    /// Says how many increments of a file are not complete.
+    pub(super) fn incomplete(&self, file: &str) -> Option<String> {
+        (self.n_broken > 0).then(|| {
+            format!(
+                "{file}: {} of {} increments are not complete and left out",
+                self.n_broken,
+                self.n + self.n_broken
+            )
+        })
+    }
+
+    /// Which of those kept are shown: at most so many, with ends of phases and extremes.
+    fn shown(&self, most: usize) -> Vec<usize> {
+        let extreme = if self.kept.len() > most {
+            self.extreme()
+        } else {
+            Vec::new()
+        };
+        let must = |i: usize| self.kept[i].ends_phase || extreme[i];
+        thinned(self.kept.len(), most, must)
+    }
+
     fn thin(&mut self) {
         let extreme = self.extreme();
         let (last, stride) = (self.n - 1, self.stride);
@@ -306,13 +328,7 @@ impl Profile {
             ..
         } = profiles;
         let points = points.filter(|points| !points.is_empty())?;
-        if blocks.n_broken > 0 {
-            notes.push(format!(
-                "profile.csv: {} of {} increments are not complete and left out",
-                blocks.n_broken,
-                blocks.n + blocks.n_broken
-            ));
-        }
+        notes.extend(blocks.incomplete("profile.csv"));
         let size = points.len() * columns.len();
         if size > most {
             notes.push(format!(
@@ -321,19 +337,11 @@ impl Profile {
             ));
             return None;
         }
-        let most = most / size.max(1);
-        let extreme = if blocks.kept.len() > most {
-            blocks.extreme()
-        } else {
-            Vec::new()
-        };
-        let must = |i: usize| blocks.kept[i].ends_phase || extreme[i];
-        let shown = thinned(blocks.kept.len(), most, must);
+        let shown = blocks.shown(most / size.max(1));
         if shown.len() < blocks.n {
+            let (all, shown) = (blocks.n, shown.len());
             notes.push(format!(
-                "of {} profiles {} are shown; profile.csv has all",
-                blocks.n,
-                shown.len()
+                "of {all} profiles {shown} are shown; profile.csv has all"
             ));
         }
         let shown: Vec<&Block> = shown.iter().map(|&i| &blocks.kept[i]).collect();

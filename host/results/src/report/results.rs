@@ -106,6 +106,18 @@ impl Times {
     }
 }
 
+/// Says how many increments the curves leave out, or that there are none.
+fn left_out(shown: usize, n: usize) -> Option<String> {
+    if n == 0 {
+        return Some("history.csv has no increment: none reached equilibrium".to_owned());
+    }
+    (shown < n).then(|| {
+        format!(
+            "the curves show {shown} of {n} increments, with the extremes of every probe; history.csv has all"
+        )
+    })
+}
+
 /// The last increment of a phase.
 #[derive(Debug)]
 pub(super) struct PhaseEnd {
@@ -120,19 +132,15 @@ impl History {
         let needed = ["phase", "increment", "time"];
         let table = Table::open(path, &needed)?;
         let [phase, increment, time] = needed.map(|name| table.position(name).unwrap_or_default());
-        let columns: Vec<usize> = (0..table.columns().len())
-            .filter(|column| ![phase, increment].contains(column))
-            .collect();
-        let names: Vec<String> = columns
-            .iter()
-            .map(|&c| table.columns()[c].clone())
-            .collect();
+        let all = 0..table.columns().len();
+        let columns: Vec<usize> = all.filter(|c| ![phase, increment].contains(c)).collect();
+        let names = columns.iter().map(|&c| table.columns()[c].clone());
+        let names: Vec<String> = names.collect();
         let time_at = columns.iter().position(|&column| column == time);
         let mut phases: Vec<String> = Vec::new();
         let mut of_row: Vec<usize> = Vec::new();
         let mut increments: Vec<usize> = Vec::new();
         let mut values: Vec<Vec<f64>> = vec![Vec::new(); columns.len()];
-        let mut times = Times::default();
         table.rows(notes, |row| {
             if phases.last().map(String::as_bytes) != Some(row.bytes(phase)) {
                 phases.push(row.text(phase));
@@ -144,12 +152,10 @@ impl History {
             }
         })?;
         let n = of_row.len();
-        if let Some(time_at) = time_at {
-            for row in 0..n {
-                let time = values[time_at][row];
-                if time.is_finite() {
-                    times.add(&phases[of_row[row]], increments[row], time);
-                }
+        let mut times = Times::default();
+        for (row, &time) in time_at.iter().flat_map(|&at| values[at].iter().enumerate()) {
+            if time.is_finite() {
+                times.add(&phases[of_row[row]], increments[row], time);
             }
         }
         let finite = |value: f64| value.is_finite().then_some(value);
@@ -163,16 +169,7 @@ impl History {
         });
         let ends: Vec<PhaseEnd> = ends.collect();
         let shown = shown_rows(&values, n, budget.history_rows(columns.len()), &last_rows);
-        if shown.len() < n {
-            notes.push(format!(
-                "the curves show {} of {n} increments, with the extremes of every probe; \
-                 history.csv has all",
-                shown.len(),
-            ));
-        }
-        if n == 0 {
-            notes.push("history.csv has no increment: none reached equilibrium".to_owned());
-        }
+        notes.extend(left_out(shown.len(), n));
         let short = |column: &Vec<f64>| -> Vec<Short> {
             let values = shown.iter().map(|&row| Short(finite(column[row])));
             values.collect()

@@ -79,36 +79,25 @@ pub(super) fn render(folder: &Path, now: Option<u64>) -> Result<String, Error> {
     let internal = |why: String| Error::Internal(format!("report: {why}"));
     let record = Record::read(folder)?;
     let rows = record.runs(folder)?;
-    let histories: Vec<History> = rows
-        .iter()
-        .map(|row| {
-            History::read_if(
-                row.standing.state != State::Planned,
-                &folder.join(&row.folder),
-            )
-        })
-        .collect();
-    let numbers: Vec<Vec<Option<f64>>> = record
-        .outputs
-        .iter()
-        .map(|output| {
-            let runs = histories.iter().zip(&rows);
-            let number = |(history, row): (&History, &Row)| {
-                history.counted(output, row.standing.state == State::Done)
-            };
-            runs.map(number).collect()
-        })
-        .collect();
+    let history = |row: &Row| {
+        let has_begun = row.standing.state != State::Planned;
+        History::read_if(has_begun, &folder.join(&row.folder))
+    };
+    let histories: Vec<History> = rows.iter().map(history).collect();
+    let numbers_of = |output: &Output| -> Vec<Option<f64>> {
+        let runs = histories.iter().zip(&rows);
+        let number = |(history, row): (&History, &Row)| {
+            history.counted(output, row.standing.state == State::Done)
+        };
+        runs.map(number).collect()
+    };
+    let numbers: Vec<_> = record.outputs.iter().map(numbers_of).collect();
     let parameters: Vec<Varied> = (0..)
         .zip(&record.parameters)
         .map(|(number, parameter)| varied(number, parameter, &rows))
         .collect();
     let columns: Vec<Vec<f64>> = parameters.iter().map(|p| p.numbers.clone()).collect();
-    let design = match (record.is_grid, record.is_saltelli) {
-        (true, _) => Design::Grid,
-        (_, true) => Design::Saltelli,
-        _ => Design::Other,
-    };
+    let design = design(&record);
     let of_output = |(output, numbers): (&'_ Output, &Vec<Option<f64>>)| {
         let found = effects(&columns, numbers, design);
         (output.name.clone(), found)
@@ -116,27 +105,21 @@ pub(super) fn render(folder: &Path, now: Option<u64>) -> Result<String, Error> {
     let found: IndexMap<String, Vec<Effect>> =
         record.outputs.iter().zip(&numbers).map(of_output).collect();
     replace_whole(&folder.join(EFFECTS), effects_table(&record, &found)?)?;
-    let units = units(folder, &rows);
+    let mut units = units(folder, &rows);
+    let of = |output: &Output| Some((output.name.clone(), units.get(&output.probe)?.clone()));
+    let of_outputs: Vec<_> = record.outputs.iter().filter_map(of).collect();
+    units.extend(of_outputs);
     let (history, left_out) = curves(&histories);
     let first = record.outputs.first();
+    let outputs = record.outputs.iter().zip(&numbers);
+    let outputs = outputs.map(|(output, numbers)| Counted {
+        name: &output.name,
+        numbers: numbers.iter().map(|number| Short(*number)).collect(),
+        effects: found[&output.name].clone(),
+    });
     let drawn = Drawn {
-        outputs: record
-            .outputs
-            .iter()
-            .zip(&numbers)
-            .map(|(output, numbers)| Counted {
-                name: &output.name,
-                numbers: numbers.iter().map(|number| Short(*number)).collect(),
-                effects: found[&output.name].clone(),
-            })
-            .collect(),
-        units: {
-            let of =
-                |output: &Output| Some((output.name.clone(), units.get(&output.probe)?.clone()));
-            let mut all = units.clone();
-            all.extend(record.outputs.iter().filter_map(of));
-            all
-        },
+        outputs: outputs.collect(),
+        units,
         at: first.and_then(|output| Some(output.at.as_ref()?.0.as_str())),
         first: first.map_or("", |output| &output.probe),
         phase: first.and_then(|output| output.phase.as_deref()),
@@ -144,14 +127,8 @@ pub(super) fn render(folder: &Path, now: Option<u64>) -> Result<String, Error> {
         parameters,
     };
     let data = serde_json::to_string(&drawn).map_err(|error| internal(error.to_string()))?;
-    let page = page(
-        (&record, design),
-        &rows,
-        &numbers,
-        &drawn,
-        (left_out, now),
-        &data,
-    );
+    let of = (&record, design);
+    let page = page(of, &rows, &numbers, &drawn, (left_out, now), &data);
     let mut environment = Environment::new();
     environment
         .add_template("report.html", TEMPLATE)
@@ -242,6 +219,14 @@ fn varied(number: usize, parameter: &ParameterRecord, rows: &[Row]) -> Varied {
     }
 }
 
+fn design(record: &Record) -> Design {
+    match (record.is_grid, record.is_saltelli) {
+        (true, _) => Design::Grid,
+        (_, true) => Design::Saltelli,
+        _ => Design::Other,
+    }
+}
+
 /// The curves, and how many rows of the longest are shown if that is not all.
 fn curves(histories: &[History]) -> (Curves, Option<usize>) {
     let names: IndexSet<&str> = histories
@@ -249,20 +234,13 @@ fn curves(histories: &[History]) -> (Curves, Option<usize>) {
         .flat_map(|history| history.names.iter().map(String::as_str))
         .filter(|name| *name != "iterations")
         .collect();
-    let phases: IndexSet<&str> = histories
-        .iter()
-        .flat_map(|history| history.phases.iter().map(String::as_str))
-        .collect();
-    let n_runs = histories
-        .iter()
-        .filter(|history| !history.phases.is_empty())
-        .count();
+    let rows = histories.iter().flat_map(|history| &history.phases);
+    let phases: IndexSet<&str> = rows.map(String::as_str).collect();
+    let drawn = histories.iter().enumerate();
+    let drawn = drawn.filter(|(_, history)| !history.phases.is_empty());
+    let n_runs = drawn.clone().count();
     let most = (MOST_NUMBERS / (n_runs * (names.len() + 1)).max(1)).max(8);
-    let longest = histories
-        .iter()
-        .map(|history| history.phases.len())
-        .max()
-        .unwrap_or(0);
+    let longest = histories.iter().map(|h| h.phases.len()).max().unwrap_or(0);
     let curve = |(run, history): (usize, &History)| {
         let of = &history.phases;
         // The last row of a phase is where it ends.
@@ -286,12 +264,8 @@ fn curves(histories: &[History]) -> (Curves, Option<usize>) {
                 .collect(),
         }
     };
-    let runs = histories
-        .iter()
-        .enumerate()
-        .filter(|(_, history)| !history.phases.is_empty());
     let curves = Curves {
-        runs: runs.map(curve).collect(),
+        runs: drawn.map(curve).collect(),
         names: names.iter().map(ToString::to_string).collect(),
         phases: phases.iter().map(ToString::to_string).collect(),
     };
@@ -306,24 +280,17 @@ fn page(
     (left_out, now): (Option<usize>, Option<u64>),
     data: &str,
 ) -> Template {
-    let failed = || {
-        rows.iter()
-            .filter(|row| matches!(row.standing.state, State::Failed(_)))
-    };
-    let outputs: Vec<Template> = record
-        .outputs
-        .iter()
-        .zip(&drawn.outputs)
-        .zip(numbers)
-        .map(|((output, counted), numbers)| {
-            output_context(output, counted, (numbers, design), drawn)
-        })
-        .collect();
+    let has_failed = |row: &&Row| matches!(row.standing.state, State::Failed(_));
+    let failed = || rows.iter().filter(has_failed);
+    let outputs = record.outputs.iter().zip(&drawn.outputs).zip(numbers);
+    let outputs = outputs.map(|((output, counted), numbers)| {
+        output_context(output, counted, (numbers, design), drawn)
+    });
+    let outputs: Vec<Template> = outputs.collect();
     let row = |(number, row): (usize, &Row)| {
-        let of_run: Vec<String> = numbers
-            .iter()
-            .map(|numbers| numbers[number].map(display).unwrap_or_default())
-            .collect();
+        let of_run = numbers.iter().map(|numbers| numbers[number]);
+        let of_run = of_run.map(|value| value.map(display).unwrap_or_default());
+        let of_run: Vec<String> = of_run.collect();
         context! { numbers => of_run, ..run_context(row) }
     };
     let parameters: Vec<Template> = record
