@@ -22,6 +22,7 @@ mod patch_joint;
 mod patch_layer;
 mod patch_solid;
 mod phases;
+mod regularised;
 mod relaxation;
 mod runaway;
 mod sections;

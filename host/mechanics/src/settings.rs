@@ -35,7 +35,7 @@ pub struct Settings {
     pub max_halvings: u32,
     /// Search along corrections that make the residual grow.
     pub line_search: bool,
-    /// Relax viscously where Newton iterations stand still.
+    /// Regularised corrections, then viscous relaxation, where Newton iterations get on slowly.
     pub relaxation: bool,
     /// Control of the path from one equilibrium to the next.
     pub control: Control,

@@ -17,6 +17,8 @@ use law::Operator;
 /// increment: what moves on is a mechanism, however small its residual.
 const LAST: usize = 5;
 const STILL_MOVES: f64 = 0.1;
+/// After regularised corrections a residual is tolerated up to this multiple of the tolerance.
+const JUST_ABOVE: f64 = 1.5;
 /// It is not tolerated if the displacement increments are more than this many times those at the start of the
 /// iterations.
 const FAR: f64 = 5.0;
@@ -212,13 +214,19 @@ impl Control for LoadControl {
         let last = iterations.len().saturating_sub(LAST);
         let corrections = iterations[last..].iter().filter_map(|i| i.correction);
         let largest = corrections.fold(0.0, f64::max);
-        let tolerated = newton.settings.tolerated_residual;
+        let mut tolerated = newton.settings.tolerated_residual;
+        if self.regularised.has_begun() {
+            tolerated = tolerated.min(JUST_ABOVE * newton.settings.force_tolerance);
+        }
         let Some((increment, _)) = self.least.take().filter(|(_, least)| *least <= tolerated)
         else {
             return Ok(None);
         };
         // Methods that keep their matrix are slow without having come to an end.
         if largest > STILL_MOVES || !newton.settings.method.is_newton() {
+            return Ok(None);
+        }
+        if self.regularised.has_begun() && !self.is_held(newton, &increment)? {
             return Ok(None);
         }
         let at = (increment, self.task.period.1);
@@ -323,6 +331,21 @@ impl LoadControl {
         }
         iterations.push(taken);
         Ok(next)
+    }
+
+    /// Whether a Newton correction of a state stays near it. Regularised ones are small along a mechanism too.
+    ///
+    /// # Errors
+    /// The step is stopped, or a law fails.
+    fn is_held(&self, newton: &mut Newton<'_>, increment: &[f64]) -> Result<bool, StepFailure> {
+        let balance = newton.evaluate(increment, &self.task, Operator::Consistent)?;
+        let correction = newton
+            .prepare(increment, &self.task)
+            .and_then(|_| newton.correction_of(&balance));
+        match correction {
+            Err(failure) if failure.is_singular() => Ok(false),
+            correction => Ok(norm(&correction?) <= STILL_MOVES * norm(increment)),
+        }
     }
 
     /// Whether regularised corrections may take over.
