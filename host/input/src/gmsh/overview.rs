@@ -46,7 +46,9 @@ fn of_bytes(bytes: &[u8]) -> Result<Overview, String> {
     // An element of several surfaces counts for the smallest one.
     let mut by_size: Vec<usize> = (0..surfaces.len()).collect();
     by_size.sort_by_key(|&group| surfaces[group]);
-    let names = by_size.iter().filter_map(|&group| surfaces.get_index(group));
+    let names = by_size
+        .iter()
+        .filter_map(|&group| surfaces.get_index(group));
     let wanted = Wanted {
         groups: names.map(|(name, _)| name.as_str()).zip(0..).collect(),
         lines: HashSet::new(),

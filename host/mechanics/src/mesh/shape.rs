@@ -1,10 +1,32 @@
-//! Areas and angles of solid elements, and which of them cannot be computed.
+//! Areas and angles of solid elements, which of them cannot be computed, and lengths of lines.
 
-use super::Solid;
+use super::{Line, Mesh, Solid};
 use crate::element::Axes;
 use crate::element::kind::Elements;
 use crate::problem::{Analysis, Integration};
+use std::collections::HashSet;
 use std::f64::consts::TAU;
+
+impl Mesh {
+    /// Nodes of a line's edges (first end, second end, middle); once where two bodies meet.
+    pub fn edges_once(&self, line: &Line) -> Vec<[usize; 3]> {
+        let mut seen = HashSet::new();
+        let all = line.edges.iter().map(|&edge| self.edge(edge));
+        all.filter(|[_, _, middle]| seen.insert(self.nodes[*middle].map(f64::to_bits)))
+            .collect()
+    }
+
+    /// Length of an edge from its first end over its middle to its second end, m.
+    pub fn length(&self, [a, b, middle]: [usize; 3]) -> f64 {
+        let to = |a: usize, b: usize| {
+            f64::hypot(
+                self.nodes[b][0] - self.nodes[a][0],
+                self.nodes[b][1] - self.nodes[a][1],
+            )
+        };
+        to(a, middle) + to(middle, b)
+    }
+}
 
 impl Solid {
     /// Its area with its sides as parabolas, m²; negative if it goes round clockwise. `at` are coordinates of all
