@@ -183,8 +183,9 @@ impl Assembly<'_> {
         for (pair, n) in std::mem::take(&mut self.shared) {
             let [low, high] = ends_of(pair[0], pair[1]).map(|group| self.wanted.name(group));
             self.notes.push(format!(
-                "physical surfaces `{low}` and `{high}` have {n} elements in common, counted here in `{low}`: a case \
-                 has only one of them as a group"
+                "physical surfaces `{low}` and `{high}` have {} in common, counted here in `{low}`: a case has only one \
+                 of them as a group",
+                counted(n, "element", "", "s")
             ));
         }
     }
@@ -539,7 +540,7 @@ impl Assembly<'_> {
 }
 
 /// `1 node is`, `2 nodes are`.
-fn counted(n: usize, what: &str, one: &str, many: &str) -> String {
+pub(super) fn counted(n: usize, what: &str, one: &str, many: &str) -> String {
     let verb = if n == 1 { one } else { many };
     format!("{n} {what}{verb}")
 }

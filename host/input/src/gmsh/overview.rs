@@ -1,6 +1,6 @@
 //! A mesh file before a case exists: its mesh with all names, and what a case should know.
 
-use super::assemble::{Assembled, assemble, list};
+use super::assemble::{Assembled, assemble, counted, list};
 use super::contents::Contents;
 use super::{Counts, Wanted, counts, unreadable};
 use crate::Error;
@@ -85,8 +85,8 @@ fn off_the_sides(mesh: &Mesh, curves: &Counts) -> Vec<String> {
         let missing = n.saturating_sub(middles.len());
         if missing > 0 {
             notes.push(format!(
-                "physical curve `{name}`: {missing} of {n} edges are no sides of elements in a physical surface; a case \
-                 with this line is refused, unless they are sides of elements that it leaves out"
+                "physical curve `{name}` has {missing} of {n} edges that are no sides of elements in a physical \
+                 surface: a case with this line is refused, unless they are sides of elements that it leaves out"
             ));
         }
     }
@@ -110,8 +110,8 @@ fn across_the_axis(mesh: &Mesh) -> Option<String> {
     let least = -NOTHING * mesh.longer_side();
     let beyond = || mesh.nodes.iter().filter(|node| node[0] < least);
     let [x, y] = *beyond().next()?;
-    let n = beyond().count();
+    let nodes = counted(beyond().count(), "node", " has", "s have");
     Some(format!(
-        "{n} nodes have x < 0, the first at ({x}, {y}): a case with axisymmetry is refused, in which x is the radius"
+        "{nodes} x < 0, the first at ({x}, {y}): a case with axisymmetry is refused, in which x is the radius"
     ))
 }
