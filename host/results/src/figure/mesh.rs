@@ -75,7 +75,7 @@ impl MeshTable {
     fn draw_elements(&self, chart: &mut Chart<'_, '_>, legend: &Area<'_>) -> Drawn<()> {
         let outline = |solid: &Solid| -> Vec<(f64, f64)> {
             let nodes = solid.edges().flat_map(|[a, _, middle]| [a, middle]);
-            nodes.map(|node| self.place(node)).collect()
+            nodes.map(|node| self.at(node)).collect()
         };
         let closed = |solid: &Solid| {
             let mut path = outline(solid);
@@ -111,12 +111,12 @@ impl MeshTable {
             let at = entry(self.groups.len() + number);
             let edges = self.mesh.edges_once(line);
             if edges.is_empty() {
-                let dot = |node: &usize| Circle::new(self.place(*node), 4, colour.filled());
+                let dot = |node: &usize| Circle::new(self.at(*node), 4, colour.filled());
                 chart.draw_series(line.nodes.iter().map(dot))?;
                 legend.draw(&Circle::new((9, at), 4, colour.filled()))?;
             } else {
                 let paths = edges.into_iter().map(|[a, b, middle]| {
-                    PathElement::new([a, middle, b].map(|node| self.place(node)), style)
+                    PathElement::new([a, middle, b].map(|node| self.at(node)), style)
                 });
                 chart.draw_series(paths)?;
                 legend.draw(&PathElement::new([(0, at), (18, at)], style))?;
@@ -126,7 +126,7 @@ impl MeshTable {
         Ok(())
     }
 
-    fn place(&self, node: usize) -> (f64, f64) {
+    fn at(&self, node: usize) -> (f64, f64) {
         let [x, y] = self.mesh.nodes[node];
         (x, y)
     }
