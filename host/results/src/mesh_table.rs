@@ -74,8 +74,8 @@ impl MeshTable {
         });
         let group = &self.groups[self.mesh.solids[solid].group];
         let number = self.numbers.get(solid);
-        let number = number.map_or_else(String::new, |number| format!("element {number} "));
-        format!("{number}of `{group}` at {}", point(middle))
+        let number = number.map_or_else(|| "an element".to_owned(), |n| format!("element {n}"));
+        format!("{number} of `{group}` at {}", point(middle))
     }
 
     fn elements(&self) -> String {

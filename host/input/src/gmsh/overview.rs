@@ -58,16 +58,16 @@ fn of_bytes(bytes: &[u8]) -> Result<Overview, String> {
     };
     let Assembled {
         mut mesh,
+        kept,
         numbers,
         mut notes,
-        ..
     } = assemble(&contents, &wanted)?;
     for solid in &mut mesh.solids {
         solid.group = by_size[solid.group];
     }
     notes.extend(off_the_sides(&mesh, &curves));
     notes.extend(two_kinds(&curves, &points));
-    notes.extend(across_the_axis(&mesh));
+    notes.extend(across_the_axis(&mesh, kept.len()));
     Ok(Overview {
         mesh,
         groups: surfaces.into_keys().collect(),
@@ -105,10 +105,10 @@ fn two_kinds(curves: &Counts, points: &Counts) -> Option<String> {
     })
 }
 
-/// Nodes that have no place in an axisymmetric case.
-fn across_the_axis(mesh: &Mesh) -> Option<String> {
+/// Nodes of the file, the first ones of the mesh, that have no place in an axisymmetric case.
+fn across_the_axis(mesh: &Mesh, of_file: usize) -> Option<String> {
     let least = -NOTHING * mesh.longer_side();
-    let beyond = || mesh.nodes.iter().filter(|node| node[0] < least);
+    let beyond = || mesh.nodes[..of_file].iter().filter(|node| node[0] < least);
     let [x, y] = *beyond().next()?;
     let nodes = counted(beyond().count(), "node", " has", "s have");
     Some(format!(

@@ -134,12 +134,13 @@ impl MeshTable {
 
 /// Ranges in which a metre is as long on both axes of a plot of this width, in points, and its height.
 fn one_scale([x, y]: &[Range<f64>; 2], width: f64) -> ([Range<f64>; 2], f64) {
-    let [dx, dy] = [x, y].map(|range| range.end - range.start);
-    let size = dx.max(dy).max(f64::MIN_POSITIVE);
-    let metre = (width / dx).min(HEIGHT.end / dy).min(1e12 * width / size);
-    let height = (dy * metre).clamp(HEIGHT.start, HEIGHT.end);
+    let length = |range: &Range<f64>| range.end - range.start;
+    let margin = 0.02 * length(x).max(length(y)).max(f64::MIN_POSITIVE);
+    let [dx, dy] = [x, y].map(|range| length(range) + margin);
+    let metre = (width / dx).min(HEIGHT.end / dy);
+    let height = (dy * metre).max(HEIGHT.start);
     let around = |range: &Range<f64>, points: f64| {
-        let spare = 0.5 * (points / metre - (range.end - range.start)) + 0.01 * size;
+        let spare = 0.5 * (points / metre - length(range));
         range.start - spare..range.end + spare
     };
     ([around(x, width), around(y, height)], height)
