@@ -57,6 +57,8 @@ pub(crate) enum Command {
         #[arg(long)]
         out: Option<PathBuf>,
     },
+    /// Show what a mesh has before a case exists: elements, groups, lines, shapes, what is refused.
+    Mesh(Mesh),
     /// Measure error against CPU time for many settings of a case or driver.
     TradeOff(TradeOff),
     /// Find parameters of laws from measured curves, with intervals.
@@ -222,6 +224,19 @@ pub(crate) struct Study {
     /// Threads of each run; the results do not depend on it [default: 1].
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     pub(crate) threads: Option<u16>,
+}
+
+/// Arguments of `pilum mesh`.
+#[derive(Args)]
+pub(crate) struct Mesh {
+    /// A mesh file of Gmsh; or a case file (`.toml`), or a folder with `case.toml`, for its mesh.
+    pub(crate) file: PathBuf,
+    /// Show only the mesh of this variant of the case.
+    #[arg(long)]
+    pub(crate) variant: Option<String>,
+    /// Draw the mesh into this file, as SVG.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) draw: Option<PathBuf>,
 }
 
 /// Arguments of `pilum trade-off`.

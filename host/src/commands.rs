@@ -1,6 +1,7 @@
 //! The commands: calls of the rooms, and their output.
 
 mod cases;
+mod meshes;
 mod studies;
 
 use crate::arguments::{Arguments, Calibrate, Command, File, Point, TradeOff};
@@ -29,6 +30,7 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
             print,
         } => write_report(&folders, out, print),
         Command::Table { folders, out } => write_table(&folders, out.as_deref()),
+        Command::Mesh(asked) => meshes::show(&asked),
         Command::TradeOff(asked) => study_settings(asked, opener),
         Command::Calibrate(asked) => calibrate(asked, opener),
         Command::Check(arguments) => {

@@ -12,6 +12,7 @@ mod libraries;
 mod loading;
 mod measured;
 mod mesh;
+mod mesh_table;
 mod model;
 mod names;
 mod overflow;

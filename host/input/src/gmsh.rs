@@ -6,6 +6,9 @@ mod contents;
 mod cursor;
 mod format;
 mod kind;
+mod overview;
+
+pub use overview::{Overview, overview};
 
 use crate::Error;
 use crate::case::CaseFile;
@@ -32,6 +35,16 @@ struct Wanted<'c> {
     analysis: Analysis,
     /// Metres in a unit of the file.
     scale: f64,
+    /// Whether a case asks; else elements in several groups are in the first of them.
+    is_case: bool,
+}
+
+impl Wanted<'_> {
+    fn name(&self, group: usize) -> &str {
+        let mut all = self.groups.iter();
+        let found = all.find(|(_, number)| **number == group);
+        found.map_or("", |(name, _)| *name)
+    }
 }
 
 /// Meaning of the names of one kind in a file.
@@ -100,6 +113,7 @@ pub(crate) fn mesh(
         mut mesh,
         kept,
         notes,
+        ..
     } = assemble::assemble(&contents, &wanted).map_err(wrong)?;
     for _ in 0..input.divisions {
         mesh = mesh.refined();
@@ -136,6 +150,7 @@ pub fn whole(bytes: &[u8]) -> Result<Mesh, String> {
         lines: lines.iter().map(String::as_str).collect(),
         analysis: Analysis::PlaneStrain,
         scale: 1.0,
+        is_case: true,
     };
     assemble::assemble(&contents, &wanted).map(|assembled| assembled.mesh)
 }
@@ -154,6 +169,7 @@ fn wanted<'c>(
         lines: HashSet::new(),
         analysis: file.analysis,
         scale,
+        is_case: true,
     };
     for (number, (name, group)) in file.groups.iter().enumerate() {
         if group.get_ref().formulation == Formulation::ZeroThickness {

@@ -2,6 +2,7 @@
 
 mod insert;
 mod refine;
+mod shape;
 
 pub use insert::{Along, CannotInsert, Reason};
 

@@ -1,6 +1,8 @@
 //! Figures as SVG: curves of probes, of stresses along a cut or of quantities along a pile, with
 //! measured points.
 
+mod mesh;
+
 use crate::output_request::{Cut, Figure, Measured};
 use crate::pile::{State, Station};
 use crate::pressures::Pressure;

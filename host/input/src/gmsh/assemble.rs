@@ -38,6 +38,8 @@ pub(super) struct Assembled {
     pub(super) mesh: Mesh,
     /// For each of its nodes the place in the file, from 0.
     pub(super) kept: Vec<usize>,
+    /// For each of its solid elements the number in the file.
+    pub(super) numbers: Vec<u64>,
     /// What the user should know.
     pub(super) notes: Vec<String>,
 }
@@ -56,6 +58,8 @@ struct Assembly<'a> {
     is_outside: Vec<bool>,
     /// Sides of elements that the case leaves out.
     outside: HashSet<Ends>,
+    /// Without a case: numbers of elements by two groups that both have them.
+    shared: IndexMap<[usize; 2], usize>,
     notes: Vec<String>,
 }
 
@@ -72,9 +76,11 @@ pub(super) fn assemble(contents: &Contents<'_>, wanted: &Wanted<'_>) -> Result<A
         put_in: Vec::new(),
         is_outside: vec![false; contents.nodes.len()],
         outside: HashSet::new(),
+        shared: IndexMap::new(),
         notes: Vec::new(),
     };
     assembly.take_elements()?;
+    assembly.note_shared();
     assembly.leave_out()?;
     assembly.put_in_middles();
     let (nodes, number) = assembly.nodes()?;
@@ -90,7 +96,9 @@ pub(super) fn assemble(contents: &Contents<'_>, wanted: &Wanted<'_>) -> Result<A
     }
     let sides = assembly.sides(&mesh)?;
     assembly.lines(&mut mesh, &number, &sides)?;
-    assembly.note_lines();
+    if wanted.is_case {
+        assembly.note_lines();
+    }
     assembly.note_cracks(&mesh);
     let n_of_file = contents.nodes.len();
     let mut kept: Vec<usize> = number.into_keys().filter(|&n| n < n_of_file).collect();
@@ -98,6 +106,7 @@ pub(super) fn assemble(contents: &Contents<'_>, wanted: &Wanted<'_>) -> Result<A
     Ok(Assembled {
         mesh,
         kept,
+        numbers: assembly.taken.iter().map(|(e, ..)| e.number).collect(),
         notes: assembly.notes,
     })
 }
@@ -114,52 +123,71 @@ impl Assembly<'_> {
         for element in contents.elements.iter().filter(|e| e.kind.dimension() == 2) {
             let groups = group_of_set
                 .entry(Contents::set_of(element))
-                .or_insert_with(|| {
-                    let names = contents.groups_of(element);
-                    let groups = names.filter_map(|n| self.wanted.groups.get(n.as_str()).copied());
-                    let mut groups: Vec<usize> = groups.collect();
-                    groups.sort_unstable();
-                    groups.dedup();
-                    groups
-                });
+                .or_insert_with(|| self.groups_of(element));
             let group = match groups.as_slice() {
                 [] => continue,
                 [group] => *group,
                 [first, second, ..] => {
                     let pair = [*first, *second];
-                    return self.in_two_groups(element, pair);
+                    self.in_two_groups(element, pair)?;
+                    pair[0]
                 }
             };
             let nodes = contents.nodes_of(element)?;
             // Format 2.2 has an element that is in two groups twice.
             let mut key = nodes;
             key.sort_unstable();
-            if let Some(other) = self.own.insert(key, self.taken.len()) {
-                let (other, _, other_group) = self.taken[other];
+            if let Some(&number) = self.own.get(&key) {
+                let (other, _, other_group) = self.taken[number];
                 if other_group != group {
-                    return self.in_two_groups(element, [other_group, group]);
+                    self.in_two_groups(element, [other_group, group])?;
+                    self.taken[number].2 = group.min(other_group);
+                    continue;
                 }
                 let both = contents.two_elements(other, element);
                 let message = format!("{both} have the same nodes");
                 return self.fault(element, &message);
             }
+            self.own.insert(key, self.taken.len());
             self.taken.push((element, nodes, group));
         }
         Ok(())
     }
 
-    fn in_two_groups(&self, element: &Element, groups: [usize; 2]) -> Result<(), Fault> {
-        let name = |group: usize| {
-            let mut all = self.wanted.groups.iter();
-            all.find(|(_, number)| **number == group)
-                .map_or("", |(name, _)| *name)
-        };
-        let [first, second] = groups.map(name);
+    /// Groups of the case that an element is in, each once, in their order.
+    fn groups_of(&self, element: &Element) -> Vec<usize> {
+        let names = self.contents.groups_of(element);
+        let groups = names.filter_map(|n| self.wanted.groups.get(n.as_str()).copied());
+        let mut groups: Vec<usize> = groups.collect();
+        groups.sort_unstable();
+        groups.dedup();
+        groups
+    }
+
+    /// Refuses an element in two groups of a case; without a case counts it.
+    fn in_two_groups(&mut self, element: &Element, groups: [usize; 2]) -> Result<(), Fault> {
+        if !self.wanted.is_case {
+            *self.shared.entry(groups).or_default() += 1;
+            return Ok(());
+        }
+        let [first, second] = groups.map(|group| self.wanted.name(group));
         let message = format!(
             "{} is in two groups of the case, `{first}` and `{second}`",
             self.contents.element(element)
         );
         self.fault(element, &message)
+    }
+
+    /// Says which physical surfaces a case cannot both have.
+    fn note_shared(&mut self) {
+        for (pair, n) in std::mem::take(&mut self.shared) {
+            let [low, high] = ends_of(pair[0], pair[1]).map(|group| self.wanted.name(group));
+            self.notes.push(format!(
+                "physical surfaces `{low}` and `{high}` have {} in common, counted here in `{low}`: a case has only one \
+                 of them as a group",
+                counted(n, "element", "", "s")
+            ));
+        }
     }
 
     /// Says which elements are left out.
@@ -512,13 +540,13 @@ impl Assembly<'_> {
 }
 
 /// `1 node is`, `2 nodes are`.
-fn counted(n: usize, what: &str, one: &str, many: &str) -> String {
+pub(super) fn counted(n: usize, what: &str, one: &str, many: &str) -> String {
     let verb = if n == 1 { one } else { many };
     format!("{n} {what}{verb}")
 }
 
 /// Some names and how many more there are.
-fn list(names: impl ExactSizeIterator<Item = String>) -> String {
+pub(super) fn list(names: impl ExactSizeIterator<Item = String>) -> String {
     let more = names.len().saturating_sub(MOST_NAMES);
     let names: Vec<String> = names.take(MOST_NAMES).collect();
     let names = names.join(", ");
@@ -550,23 +578,9 @@ fn middles(sides: &[Option<Side>]) -> HashMap<Ends, usize> {
 /// An element of the mesh, its nodes counter-clockwise.
 fn turned(kind: &'static element::Kind, at: &[[f64; 2]], nodes: Nodes, group: usize) -> Solid {
     let solid = Solid::new(kind, &nodes, group);
-    if area(at, &solid) < 0.0 {
+    if solid.area(at) < 0.0 {
         solid.reversed()
     } else {
         solid
     }
-}
-
-/// Area of an element, negative if it goes round clockwise.
-fn area(at: &[[f64; 2]], solid: &Solid) -> f64 {
-    let origin = at[solid.nodes()[0]];
-    let cross = |p: [f64; 2], q: [f64; 2]| p[0] * q[1] - p[1] * q[0];
-    let sides = solid.edges().map(|side| {
-        let [a, b, middle] = side.map(|node| [0, 1].map(|c| at[node][c] - origin[c]));
-        let along = [0, 1].map(|c| b[c] - a[c]);
-        let rise = [0, 1].map(|c| middle[c] - 0.5 * (a[c] + b[c]));
-        // Below the chord, and between it and the parabola.
-        0.5 * cross(a, b) + 2.0 / 3.0 * cross(rise, along)
-    });
-    sides.sum()
 }

@@ -4,10 +4,8 @@
 use crate::summary::About;
 use mechanics::Simulation;
 use mechanics::ground::Loading;
-use mechanics::mesh::Mesh;
 use mechanics::problem::{Analysis, Axis, Drainage, Formulation, Phase, Problem, Profile};
 use serde::Serialize;
-use std::collections::HashSet;
 
 /// What the page draws over the mesh, and shows in tables.
 #[derive(Debug, Serialize)]
@@ -104,13 +102,9 @@ impl Model {
 
 fn line(problem: &Problem, name: &str) -> NamedLine {
     let mesh = &problem.mesh;
-    let mut seen = HashSet::new();
     let (mut edges, mut nodes) = (Vec::new(), Vec::new());
     if let Some(line) = mesh.lines.get(name) {
-        let all = line.edges.iter().map(|&edge| mesh.edge(edge));
-        edges = all
-            .filter(|[_, _, middle]| seen.insert(mesh.nodes[*middle].map(f64::to_bits)))
-            .collect();
+        edges = mesh.edges_once(line);
         nodes.clone_from(&line.nodes);
     }
     let held = |axis: Axis| {
@@ -125,22 +119,12 @@ fn line(problem: &Problem, name: &str) -> NamedLine {
         .collect();
     NamedLine {
         name: name.to_owned(),
-        length: edges.iter().map(|edge| length(mesh, *edge)).sum(),
+        length: edges.iter().map(|edge| mesh.length(*edge)).sum(),
         edges,
         nodes,
         fixed,
         support: held.join(", "),
     }
-}
-
-fn length(mesh: &Mesh, [a, b, middle]: [usize; 3]) -> f64 {
-    let to = |a: usize, b: usize| {
-        f64::hypot(
-            mesh.nodes[b][0] - mesh.nodes[a][0],
-            mesh.nodes[b][1] - mesh.nodes[a][1],
-        )
-    };
-    to(a, middle) + to(middle, b)
 }
 
 /// A stage of which only the water is known.

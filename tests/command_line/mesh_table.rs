@@ -1,0 +1,145 @@
+//! `pilum mesh`: what a mesh has before a case exists.
+
+use crate::program::{BAD_INPUT, CASE, DONE, JOINT, Outcome, Place, edited};
+
+/// A triangle of 3 nodes beside a quad of 4, in two surfaces; a third one has both. The lower side, and a curve off the
+/// mesh. Areas are 1 and 2.
+const MESH: &str = r#"$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$PhysicalNames
+5
+2 1 "ground"
+2 2 "pile"
+2 3 "all"
+1 4 "bottom"
+1 5 "stray"
+$EndPhysicalNames
+$Nodes
+6
+1 0 0 0
+2 2 0 0
+3 2 1 0
+4 0 1 0
+5 4 0 0
+6 9 9 0
+$EndNodes
+$Elements
+7
+1 1 2 4 1 1 2
+2 1 2 4 1 2 5
+3 1 2 5 1 5 6
+11 3 2 1 1 1 2 3 4
+12 2 2 2 2 2 5 3
+11 3 2 3 1 1 2 3 4
+12 2 2 3 2 2 5 3
+$EndElements
+"#;
+
+fn shown(mesh: &str) -> Outcome {
+    let place = Place::new();
+    place.write("a.msh", mesh);
+    let outcome = place.run(&["mesh", "a.msh"]);
+    assert_eq!(place.contents(), ["a.msh"]);
+    outcome
+}
+
+/// The words of the line that begins with this one.
+fn words<'o>(outcome: &'o Outcome, first: &str) -> Vec<&'o str> {
+    let mut lines = outcome.stdout.lines().map(str::trim_start);
+    let line = lines.find(|line| line.starts_with(first));
+    line.unwrap_or_default().split_whitespace().collect()
+}
+
+#[test]
+fn shows_what_a_mesh_has() {
+    let outcome = shown(MESH);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let of = |first| words(&outcome, first).join(" ");
+    assert_eq!(
+        of("elements"),
+        "elements 1 triangle of 6 nodes, 1 quad of 8 nodes"
+    );
+    assert_eq!(of("extent"), "extent, m x 0 to 4, y 0 to 1");
+    assert_eq!(of("ground"), "ground 1 2");
+    assert_eq!(of("pile"), "pile 1 1");
+    assert_eq!(of("bottom"), "bottom 2 4 (0, 0), (4, 0)");
+    // atan(1/2), at the corner (4, 0); the quad is a rectangle, and has the first right angle.
+    let place = "element 12 of `pile` at (2.66667, 0.333333)";
+    assert_eq!(of("least angle"), format!("least angle 26.6°, {place}"));
+    assert_eq!(
+        of("largest angle"),
+        "largest angle 90.0°, element 11 of `ground` at (1, 0.5)"
+    );
+    for note in [
+        "2 elements are of first order",
+        "1 node belongs to no triangle or quad",
+        "surfaces `ground` and `all` have 1 element in common",
+        "physical curve `stray` has 1 of 1 edges that are no sides",
+    ] {
+        assert!(outcome.stdout.contains(note), "{note}\n{}", outcome.stdout);
+    }
+}
+
+#[test]
+fn says_what_is_refused() {
+    // A dent: the corner of the quad beyond its diagonal, with a negative Jacobian.
+    let dented = shown(&MESH.replace("4 0 1 0\n", "4 1.9 0.1 0\n"));
+    assert_eq!(dented.code, Some(BAD_INPUT), "{}", dented.stdout);
+    assert!(dented.says("1 element is degenerate: the Jacobian is not positive"));
+    assert!(dented.says("the first is element 11 of `ground`"));
+    assert!(dented.stdout.contains("largest angle"), "{}", dented.stdout);
+
+    let left = shown(&MESH.replace("1 0 0 0\n", "1 -1 0 0\n"));
+    assert_eq!(left.code, Some(DONE), "{}", left.stderr);
+    let note = "1 node has x < 0, the first at (-1, 0)";
+    assert!(left.stdout.contains(note), "{}", left.stdout);
+
+    let solid = shown(&MESH.replace("11 3 2 1 1", "11 4 2 1 1"));
+    assert_eq!(solid.code, Some(BAD_INPUT));
+    assert!(solid.says("cannot read a.msh"), "{}", solid.stderr);
+    assert!(solid.says("line 26: an element of type 4 is a tetrahedron"));
+    assert_eq!(solid.stdout, "");
+
+    let nodes = &MESH[MESH.find("$Nodes").unwrap()..MESH.find("$Elements").unwrap()];
+    let format = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n";
+    let elements = "$Elements\n1\n11 3 2 0 1 1 2 3 4\n$EndElements\n";
+    let nameless = shown(&format!("{format}{nodes}{elements}"));
+    assert_eq!(nameless.code, Some(BAD_INPUT), "{}", nameless.stdout);
+    assert!(
+        nameless.says("no surface has a name"),
+        "{}",
+        nameless.stderr
+    );
+}
+
+#[test]
+fn shows_and_draws_the_mesh_of_a_case() {
+    let place = Place::new();
+    place.write("case.toml", edited(JOINT));
+    let outcome = place.run(&["mesh", "case.toml", "--draw", "mesh.svg"]);
+    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let of = |first| words(&outcome, first).join(" ");
+    assert_eq!(
+        of("elements"),
+        "elements 6 quads of 8 nodes, 3 elements without thickness"
+    );
+    assert_eq!(of("soil"), "soil 6 2");
+    assert_eq!(of("layer"), "layer 3 2 long");
+    assert_eq!(of("middle"), "middle 3 2 (0, 0.5), (2, 0.5)");
+    assert!(outcome.stdout.ends_with("drawing in mesh.svg\n"));
+    let drawing = std::fs::read_to_string(place.path("mesh.svg")).unwrap();
+    assert_eq!(drawing.matches("<polygon").count(), 6);
+    for name in ["soil", "layer", "left", "middle", "corner"] {
+        assert!(drawing.contains(name), "{name}");
+    }
+
+    let variants = format!("{CASE}\n[[variant]]\nname = \"a\"\n[[variant]]\nname = \"b\"\n");
+    place.write("case.toml", variants);
+    let two = place.run(&["mesh", ".", "--draw", "two.svg"]);
+    assert_eq!(two.code, Some(BAD_INPUT));
+    assert!(two.says("--draw is for one mesh"), "{}", two.stderr);
+    let one = place.run(&["mesh", ".", "--variant", "b"]);
+    assert!(one.stdout.contains("variant `b`"), "{}", one.stderr);
+    assert!(!one.stdout.contains("variant `a`"), "{}", one.stdout);
+}
