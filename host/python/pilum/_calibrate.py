@@ -19,6 +19,8 @@ from ._table import Table
 
 __all__ = ["Calibration", "calibrate"]
 
+_TEXTS = {"parameter", "stage", "test", "unit", "lower_end", "upper_end", "x_column", "y_column"}
+
 
 class Calibration:
     """Outcome of a calibration, from its folder."""
@@ -44,7 +46,7 @@ class Calibration:
         """A row for each parameter: `value`, ends of its interval `lower` and `upper` (NaN where there is none),
         and how they were found: `lower_end`, `upper_end` ("limit" is an end of the interval), linear
         intervals, `relative_error`, `unit`."""
-        return Table.read(self.folder / "parameters.csv")
+        return Table._read(self.folder / "parameters.csv", _TEXTS)
 
     @property
     def values(self) -> NDArray[np.float64]:
@@ -86,7 +88,7 @@ class Calibration:
     def fit(self) -> Table:
         """A row for each measured point: `test`, `predicted`, `x`, `measured`, `computed`, `noise`,
         `deviation`."""
-        return Table.read(self.folder / "fit.csv")
+        return Table._read(self.folder / "fit.csv", _TEXTS)
 
     @property
     def residuals(self) -> dict[str, NDArray[np.float64]]:
@@ -98,7 +100,7 @@ class Calibration:
     @cached_property
     def profiles(self) -> dict[str, Table]:
         """Profiles by parameter: `value`, and `sum`, the least sum of squares with it; empty without profiles."""
-        rows = Table.read(self.folder / "profiles.csv")
+        rows = Table._read(self.folder / "profiles.csv", _TEXTS)
         stages = {parameter["name"]: parameter["stage"] for parameter in self.summary["parameters"]}
         own = {name: rows.where(parameter=name, stage=stage) for name, stage in stages.items()} if rows else {}
         return {name: profile for name, profile in own.items() if len(profile)}

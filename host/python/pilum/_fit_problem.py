@@ -158,7 +158,6 @@ class CalibrationProblem:
         if len(sides) < 2:
             sides.append((values[place], values))
         above, below = sides[0], sides[-1]
-        total = np.zeros(0)
         parts = []
         for test in self._tests:
             readings = [number for curve in test.curves for number in curve.readings]
@@ -167,7 +166,7 @@ class CalibrationProblem:
                 parts.append(change / (above[0] - below[0]))
             else:
                 parts.append(np.zeros(sum(len(curve.at) for curve in test.curves)))
-        return np.concatenate([total, *parts])
+        return np.concatenate(parts)
 
     def _residuals(self, test: _Test, values: _Values) -> _Values:
         table = self._table(test, values)

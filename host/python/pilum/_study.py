@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._command import carry_out, read_toml, toml_value
-from ._errors import InputError
+from ._errors import Error, InputError
 from ._results import Results
 from ._table import Table
 
@@ -37,7 +37,7 @@ class Study:
     @cached_property
     def runs(self) -> Table:
         """A row for each run: `index`, `folder`, parameters, outputs (NaN where there is none), `state`, `reason`."""
-        return Table.read(self.folder / "runs.csv")
+        return Table._read(self.folder / "runs.csv", {"folder", "state", "reason"})
 
     @property
     def parameters(self) -> list[str]:
@@ -62,7 +62,7 @@ class Study:
         path = self.folder / "effects.csv"
         if not path.is_file():
             raise InputError(f"the study has written no {path}", hint="a parameter needs two values or more")
-        return Table.read(path)
+        return Table._read(path, {"output", "parameter"})
 
     @cached_property
     def curves(self) -> Table:
@@ -70,13 +70,15 @@ class Study:
         `pandas.DataFrame(curves)` take it."""
         tables = []
         for index, name in zip(self.runs["index"], self.runs["folder"]):
-            # A name with digits only is read as a number.
-            path = self.folder / f"{int(name):05d}" / "history.csv"
+            path = self.folder / str(name) / "history.csv"
             if path.is_file():
                 table = Table.read(path)
                 tables.append({"run": np.full(len(table), int(index)), **table})
         names = list(dict.fromkeys(name for table in tables for name in table))
-        return Table({name: np.concatenate([_column(table, name) for table in tables]) for name in names})
+        if not tables:
+            raise InputError("no run has written a `history.csv`")
+        columns = {name: [_column(table, name) for table in tables] for name in names}
+        return Table({name: np.concatenate(column) for name, column in columns.items()})
 
     def results(self, index: int) -> Results:
         """`Results` of a run, by its number from 1."""
@@ -91,7 +93,8 @@ class Study:
         """`runs` as a DataFrame with the numbers of the runs as index."""
         import pandas
 
-        return pandas.DataFrame(dict(self.runs)).set_index("index")
+        runs = pandas.DataFrame(dict(self.runs))
+        return runs.astype({"index": "int64"}).set_index("index")
 
     def _repr_html_(self) -> str:
         effects = self.effects._repr_html_() if (self.folder / "effects.csv").is_file() else ""
@@ -136,14 +139,20 @@ def study(
     else:
         path = Path(file) / "study.toml" if Path(file).is_dir() else Path(file)
         content, place = read_toml(path), path.parent
-    content["case"] = (place / content["case"]).absolute()
+    if "case" in content:
+        content["case"] = (place / content["case"]).absolute()
     if sample is not None:
         content = _with_sample(content, sample)
     with tempfile.TemporaryDirectory() as written:
         text = "".join(f"{key} = {toml_value(value)}\n" for key, value in content.items())
         path = Path(written) / f"{name}.toml"
         path.write_text(text, encoding="utf-8")
-        carry_out(["study", os.fspath(path), *options])
+        try:
+            carry_out(["study", os.fspath(path), *options])
+        except Error as error:
+            if error.file == os.fspath(path):  # which nobody has written
+                error.file = error.line = error.column = None
+            raise
     return Study(folder)
 
 

@@ -24,17 +24,17 @@ class Check:
         self.library = Path(outcome["library"])
         """The library."""
         self.checks: list[dict[str, Any]] = outcome["checks"]
-        """Each check with `id`, `status` and its message."""
+        """Each check with `id`, `family`, `description`, `outcome` and `details`."""
         self.counts: dict[str, int] = outcome["counts"]
-        """Number of checks by status."""
+        """Number of checks by outcome."""
 
     @property
     def passed(self) -> bool:
         """Whether no check failed or crashed."""
-        return not any(self.counts.get(status) for status in ("failed", "crashed"))
+        return not any(self.counts.get(outcome) for outcome in ("failed", "crashed"))
 
     def __repr__(self) -> str:
-        counts = ", ".join(f"{number} {status}" for status, number in self.counts.items())
+        counts = ", ".join(f"{number} {outcome}" for outcome, number in self.counts.items())
         return f"<pilum.Check of {self.library.name}: {counts}>"
 
     def _repr_html_(self) -> str:
