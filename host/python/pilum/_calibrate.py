@@ -7,6 +7,7 @@ import os
 from collections.abc import Mapping
 from functools import cached_property
 from html import escape
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -128,8 +129,7 @@ class Calibration:
 
     def to_pandas(self) -> Any:
         """`parameters` as a DataFrame with the names as index."""
-        import pandas
-
+        pandas: Any = import_module("pandas")
         return pandas.DataFrame(dict(self.parameters)).set_index("parameter")
 
     def _repr_html_(self) -> str:

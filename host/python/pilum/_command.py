@@ -32,7 +32,7 @@ def carry_out(arguments: Sequence[str], allowed: Sequence[int] = (0,)) -> str:
     )
     if done.returncode == 130:
         raise KeyboardInterrupt
-    if done.returncode not in allowed:
+    if done.returncode not in allowed or done.returncode and not done.stdout:
         raise _error(done.returncode, done.stderr)
     for line in done.stderr.splitlines():
         if line.startswith("warning: "):

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _pilum
 from ._calibrate import Calibration, calibrate
 from ._errors import Error, InputError, LawError
-from ._merge import merged
+from ._merge import merged, variants
 from ._run import point, run
 
 __all__ = ["CalibrationProblem"]
@@ -46,7 +46,22 @@ class _Test(NamedTuple):
     fixed: dict[str, Any]
     targets: list[tuple[str, int]]
     increments: list[int]
+    variants: int
+    step: float
     curves: list[_Curve]
+
+    def settings(self, values: _Values) -> dict[str, Any]:
+        """Settings of its file with these values of all parameters."""
+        return {**self.fixed, **{key: float(values[place]) for key, place in self.targets}}
+
+    def places(self) -> set[int | None]:
+        """Places of the parameters that move it."""
+        read = [place for curve in self.curves for place in curve.readings]
+        return {place for _, place in self.targets} | set(read)
+
+    def points(self) -> int:
+        """Number of measured points."""
+        return sum(len(curve.at) for curve in self.curves)
 
 
 class CalibrationProblem:
@@ -94,8 +109,7 @@ class CalibrationProblem:
             for test in content["test"]
             if not test.get("predict", False)
         ]
-        has_case = any(test.is_case for test in self._tests)
-        self._step = float(content.get("difference", 1e-3 if has_case else 1e-4))
+        self._step = float(content.get("difference", max(test.step for test in self._tests)))
 
     def residuals(self, theta: ArrayLike) -> _Values:
         """Residuals of all points, shape (points,): computed less measured values over their noise, times the root
@@ -104,7 +118,7 @@ class CalibrationProblem:
         Raises InputError for values outside `bounds`, LawError or NoEquilibriumError where a test has no answer.
         """
         values = self._checked(theta)
-        return np.concatenate([self._residuals(test, values) for test in self._tests])
+        return np.concatenate(self._residuals(self._tests, values))
 
     def jacobian(self, theta: ArrayLike) -> _Values:
         """Derivatives of `residuals` by the parameters, shape (points, parameters): central differences with the
@@ -158,28 +172,29 @@ class CalibrationProblem:
         if len(sides) < 2:
             sides.append((values[place], values))
         above, below = sides[0], sides[-1]
-        parts = []
-        for test in self._tests:
-            readings = [number for curve in test.curves for number in curve.readings]
-            if place in [number for _, number in test.targets] or place in readings:
-                change = self._residuals(test, above[1]) - self._residuals(test, below[1])
-                parts.append(change / (above[0] - below[0]))
-            else:
-                parts.append(np.zeros(sum(len(curve.at) for curve in test.curves)))
-        return np.concatenate(parts)
+        moved = [test for test in self._tests if place in test.places()]
+        pairs = zip(self._residuals(moved, above[1]), self._residuals(moved, below[1]))
+        changes = iter([(a - b) / (above[0] - below[0]) for a, b in pairs])
+        return np.concatenate(
+            [next(changes) if place in test.places() else np.zeros(test.points()) for test in self._tests]
+        )
 
-    def _residuals(self, test: _Test, values: _Values) -> _Values:
-        table = self._table(test, values)
-        return np.concatenate([_of_curve(test, curve, table, values) for curve in test.curves])
-
-    def _table(self, test: _Test, values: _Values) -> dict[str, _Values]:
-        settings = {**test.fixed, **{key: float(values[place]) for key, place in test.targets}}
-        if not test.is_case:
-            table = point(test.path, set=settings, variant=test.variant)
-            return {**table, **_derived(table)}
-        with tempfile.TemporaryDirectory() as folder:
-            done = run(test.path, set=settings, variant=test.variant, results=folder, checkpoints=None)
-            return dict(done.history)
+    def _residuals(self, tests: list[_Test], values: _Values) -> list[_Values]:
+        """Those of each test. Variants of a driver with the same settings are computed in one call, which is quicker."""
+        shared: dict[str, Any] = {}
+        found = []
+        for test in tests:
+            settings = test.settings(values)
+            key = f"{test.path} {settings}"
+            if test.variants and key not in shared:
+                number = sum(other.path == test.path for other in tests)
+                try:
+                    shared[key] = point(test.path, set=settings) if 2 * number > test.variants else {}
+                except Error:
+                    shared[key] = {}
+            table = shared.get(key, {}).get(test.variant) or _table(test, settings)
+            found.append(np.concatenate([_of_curve(test, curve, table, values) for curve in test.curves]))
+        return found
 
     def _test(
         self, test: dict[str, Any], content: dict[str, Any], folder: Path, calibration: Calibration
@@ -188,22 +203,36 @@ class CalibrationProblem:
         path = folder / test["case" if is_case else "driver"]
         own = merged(path / "case.toml" if path.is_dir() else path, test.get("variant"))
         fixed, targets = self._targets(test, content, own)
+        return _Test(
+            name=test["name"],
+            path=path,
+            is_case=is_case,
+            variant=test.get("variant"),
+            fixed=fixed,
+            targets=targets,
+            increments=[segment["increments"] for segment in own.get("segment", [])],
+            variants=0 if is_case or "variant" not in test else variants(path),
+            step=_step(own) if is_case else 1e-4,
+            curves=self._curves(test, own, calibration),
+        )
+
+    def _curves(self, test: dict[str, Any], own: dict[str, Any], calibration: Calibration) -> list[_Curve]:
+        """Measured curves, their points and noise as the command has them."""
         fit = calibration.fit.where(test=test["name"], predicted="false")
+        (known,) = (other["curves"] for other in calibration.summary["tests"] if other["name"] == test["name"])
         curves, first = [], 0
         for number, written in enumerate(test["curve"]):
-            rows = next(
-                c for t in calibration.summary["tests"] if t["name"] == test["name"] for c in [t["curves"][number]]
-            )["points"]
-            part = slice(first, first + rows)
-            first += rows
+            part = slice(first, first + known[number]["points"])
+            first = part.stop
             alone = sum(other["y"] == written["y"] for other in test["curve"]) == 1
             which = "" if alone else f", curve {number + 1}"
             names = [f"{key} of {test['name']}, {written['y']}{which}" for key in _READINGS]
+            last = own["phase"][-1]["name"] if "case" in test else None
             curves.append(
                 _Curve(
                     x=written["x"],
                     y=written["y"],
-                    stretch=written.get("phase", own["phase"][-1]["name"]) if is_case else written.get("segment"),
+                    stretch=written.get("phase", written.get("segment", last)),
                     at=fit["x"][part],
                     measured=fit["measured"][part],
                     noise=fit["noise"][part],
@@ -211,8 +240,7 @@ class CalibrationProblem:
                     readings=[self.names.index(name) if name in self.names else None for name in names],
                 )
             )
-        increments = [] if is_case else [segment["increments"] for segment in own["segment"]]
-        return _Test(test["name"], path, is_case, test.get("variant"), fixed, targets, increments, curves)
+        return curves
 
     def _targets(
         self, test: dict[str, Any], content: dict[str, Any], own: dict[str, Any]
@@ -229,12 +257,28 @@ class CalibrationProblem:
                 is_another = laws and test.get("stands_for", laws[0]) not in laws
                 keys = [f"parameters.{id}"] if id in _ids(own) and not is_another else []
             for key in keys:
-                fixed.pop(key, None), targets.pop(key, None)
+                if key in fixed or key in targets:
+                    continue
                 if "value" in given:
                     fixed[key] = given["value"]
                 else:
                     targets[key] = self.names.index(name)
         return fixed, list(targets.items())
+
+
+def _table(test: _Test, settings: dict[str, Any]) -> dict[str, _Values]:
+    """Computed columns of a test: of a driver, or of the history of a case."""
+    if not test.is_case:
+        return dict(point(test.path, set=settings, variant=test.variant))
+    with tempfile.TemporaryDirectory() as folder:
+        done = run(test.path, set=settings, variant=test.variant, results=folder, checkpoints=None)
+        return dict(done.history)
+
+
+def _step(case: dict[str, Any]) -> float:
+    """Step of differences of a case: what its tolerance of equilibrium leaves to see."""
+    tolerance = case.get("solver", {}).get("force_tolerance", 1e-9)
+    return float(np.clip(np.sqrt(tolerance), 1e-3, 0.03))
 
 
 def _ids(driver: dict[str, Any]) -> set[str]:
@@ -263,6 +307,7 @@ def _derived(table: Mapping[str, _Values]) -> dict[str, _Values]:
 
 def _of_curve(test: _Test, curve: _Curve, table: Mapping[str, _Values], values: _Values) -> _Values:
     """Residuals of a curve. The computed one is linear between its rows."""
+    table = table if test.is_case else {**table, **_derived(table)}
     if test.is_case:
         chosen: Any = table["phase"] == curve.stretch
     elif curve.stretch is None:
@@ -279,4 +324,5 @@ def _of_curve(test: _Test, curve: _Curve, table: Mapping[str, _Values], values: 
     starts = curve.readings[0] is not None or at.min() >= x[0] - slack
     if not (starts and at.max() <= x[-1] + slack) or np.any(np.diff(x) <= 0.0):
         raise LawError(f"{test.name}, {curve.y}: the computed curve ends before its last measured point, or turns")
-    return np.sqrt(curve.weight) * (np.interp(at, x, y) - curve.measured) / curve.noise
+    residuals: _Values = np.sqrt(curve.weight) * (np.interp(at, x, y) - curve.measured) / curve.noise
+    return residuals

@@ -9,7 +9,7 @@ from typing import Any
 
 from ._command import read_toml
 
-__all__ = ["merged"]
+__all__ = ["merged", "variants"]
 
 
 def merged(
@@ -24,6 +24,11 @@ def merged(
     for key, value in (set or {}).items():
         _put(content, key.split("."), value)
     return content
+
+
+def variants(path: str | os.PathLike[str]) -> int:
+    """Number of variants of a file."""
+    return len(_with_base(Path(path)).get("variant", []))
 
 
 def _with_base(path: Path) -> dict[str, Any]:

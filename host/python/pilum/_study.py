@@ -7,6 +7,7 @@ import os
 import tempfile
 from collections.abc import Mapping
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -91,8 +92,7 @@ class Study:
 
     def to_pandas(self) -> Any:
         """`runs` as a DataFrame with the numbers of the runs as index."""
-        import pandas
-
+        pandas: Any = import_module("pandas")
         runs = pandas.DataFrame(dict(self.runs))
         return runs.astype({"index": "int64"}).set_index("index")
 

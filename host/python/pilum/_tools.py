@@ -7,14 +7,14 @@ import os
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
-from typing import Any, Union
+from typing import Any, TypeAlias, Union
 
 from ._command import carry_out, settings
 from ._table import Table
 
 __all__ = ["Check", "check", "report", "table"]
 
-_Folders = Union[str, "os.PathLike[str]", Sequence[Union[str, "os.PathLike[str]"]]]
+_Folders: TypeAlias = Union[str, "os.PathLike[str]", Sequence[Union[str, "os.PathLike[str]"]]]
 
 
 class Check:
@@ -73,8 +73,9 @@ def check(
 
 
 def _several(folders: _Folders) -> list[str]:
-    one = isinstance(folders, (str, os.PathLike))
-    return [os.fspath(folder) for folder in ([folders] if one else folders)]  # type: ignore[list-item]
+    if isinstance(folders, (str, os.PathLike)):
+        return [os.fspath(folders)]
+    return [os.fspath(folder) for folder in folders]
 
 
 def table(folders: _Folders) -> Table:
