@@ -49,14 +49,20 @@ tau = { group = "joint", quantity = "traction_t" }
 u = { line = "top", quantity = "displacement_x" }
 """
 
-STUDY = """case = "case.toml"
+CHAMBER = f"""base = "{(pilum.cases() / "chamber_mesh1/case.toml").as_posix()}"
+[[phase]]
+name = "loading"
+increments = 4
+"""
+
+STUDY = """case = "chamber.toml"
 method = "saltelli"
 runs = 8
 parameter = [
-  { name = "c", key = "laws.joint.parameters.cohesion", uniform = [0.0, 10.0] },
-  { name = "phi", key = "laws.joint.parameters.friction_angle", uniform = [20.0, 40.0] },
+  { name = "mu_p", key = "laws.mepi.parameters.mu_p", uniform = [0.6, 0.8] },
+  { name = "young_modulus", key = "laws.sand.parameters.young_modulus", uniform = [25e3, 45e3] },
 ]
-outputs = { strength = { probe = "tau", take = "max" } }
+outputs = { shaft = { probe = "q_s" } }
 """
 
 
@@ -207,25 +213,25 @@ def test_a_wrong_calibration_names_its_place(here: Path) -> None:
 @pytest.fixture(scope="module")
 def saltelli(tmp_path_factory: pytest.TempPathFactory) -> pilum.Study:
     folder = tmp_path_factory.mktemp("study")
-    (folder / "case.toml").write_text(CASE)
+    (folder / "chamber.toml").write_text(CHAMBER)
     (folder / "study.toml").write_text(STUDY)
     return pilum.study(folder / "study.toml", results=folder / "out")
 
 
 def test_a_study_is_an_object(saltelli: pilum.Study) -> None:
-    assert (saltelli.parameters, saltelli.outputs) == (["c", "phi"], ["strength"])
+    assert (saltelli.parameters, saltelli.outputs) == (["mu_p", "young_modulus"], ["shaft"])
     assert saltelli.sample.shape == (32, 2) and set(saltelli.runs["state"]) == {"done"}
     keys = [parameter["keys"][0] for parameter in saltelli.summary["parameters"]]
-    case = saltelli.folder.parent / "case.toml"
+    case = saltelli.folder.parent / "chamber.toml"
     alone = pilum.run(case, set=dict(zip(keys, saltelli.sample[4].tolist())), results=saltelli.folder.parent / "alone")
-    assert alone.history["tau"].max() == saltelli.runs["strength"][4]
+    assert alone.history["q_s"][-1] == saltelli.runs["shaft"][4]
     frame = saltelli.to_pandas()
-    assert list(frame.columns) == ["folder", "c", "phi", "strength", "state", "reason"] and frame.index[0] == 1
+    assert list(frame.columns) == ["folder", "mu_p", "young_modulus", "shaft", "state", "reason"] and frame.index[0] == 1
     assert saltelli.curves["run"].tolist() == list(np.repeat(np.arange(1, 33), len(saltelli.results(1).history)))
     arrow = pytest.importorskip("pyarrow").table(saltelli.curves)
-    assert arrow.num_rows == len(saltelli.curves) and "tau" in arrow.column_names
+    assert arrow.num_rows == len(saltelli.curves) and "q_s" in arrow.column_names
     assert "<table>" in saltelli._repr_html_()
-    assert pilum.table(saltelli.folder)["strength"].tolist() == saltelli.runs["strength"].tolist()
+    assert pilum.table(saltelli.folder)["shaft"].tolist() == saltelli.runs["shaft"].tolist()
 
 
 def test_salib_has_the_indices_of_the_command(saltelli: pilum.Study, here: Path) -> None:
@@ -238,26 +244,26 @@ def test_salib_has_the_indices_of_the_command(saltelli: pilum.Study, here: Path)
         order = [0, 2, 1, 3]
     sample = groups[:, order].reshape(-1, 2)
     again = pilum.study(saltelli.folder.parent / "study.toml", sample=sample, results=here / "again")
-    outputs = saltelli.runs["strength"].reshape(8, 4)[:, order].ravel()
+    outputs = saltelli.runs["shaft"].reshape(8, 4)[:, order].ravel()
     assert again.sample.tolist() == sample.tolist()
-    assert again.runs["strength"].tolist() == outputs.tolist()
-    problem = {"num_vars": 2, "names": ["c", "phi"], "bounds": [[0, 10], [20, 40]]}
-    indices = analyze.analyze(problem, again.runs["strength"], calc_second_order=False, num_resamples=10, seed=1)
-    effects = {str(row): saltelli.effects.where(parameter=row) for row in ("c", "phi")}
-    shares = [effects[name]["share"][0] for name in ("c", "phi")]
-    totals = [effects[name]["total"][0] for name in ("c", "phi")]
+    assert again.runs["shaft"].tolist() == outputs.tolist()
+    problem = {"num_vars": 2, "names": ["mu_p", "young_modulus"], "bounds": [[0.6, 0.8], [25e3, 45e3]]}
+    indices = analyze.analyze(problem, again.runs["shaft"], calc_second_order=False, num_resamples=10, seed=1)
+    effects = {str(row): saltelli.effects.where(parameter=row) for row in ("mu_p", "young_modulus")}
+    shares = [effects[name]["share"][0] for name in ("mu_p", "young_modulus")]
+    totals = [effects[name]["total"][0] for name in ("mu_p", "young_modulus")]
     assert np.allclose(indices["S1"], shares, atol=1e-9) and np.allclose(indices["ST"], totals, atol=1e-9)
 
 
 def test_a_wrong_sample_is_refused(here: Path) -> None:
-    (here / "case.toml").write_text(CASE)
+    (here / "chamber.toml").write_text(CHAMBER)
     (here / "study.toml").write_text(STUDY)
     with pytest.raises(pilum.InputError, match=r"shape \(2, 3\)"):
         pilum.study("study.toml", sample=np.zeros((2, 3)))
-    with pytest.raises(pilum.InputError, match="no `phi`"):
-        pilum.study("study.toml", sample={"c": [1.0]})
+    with pytest.raises(pilum.InputError, match="no `young_modulus`"):
+        pilum.study("study.toml", sample={"mu_p": [0.7]})
     with pytest.raises(pilum.InputError) as caught:
-        pilum.study({"case": "case.toml", "method": "lst"})
+        pilum.study({"case": "chamber.toml", "method": "lst"})
     assert (caught.value.file, caught.value.key) == (None, "method")
 
 

@@ -38,7 +38,8 @@ class Study:
     @cached_property
     def runs(self) -> Table:
         """A row for each run: `index`, `folder`, parameters, outputs (NaN where there is none), `state`, `reason`."""
-        return Table._read(self.folder / "runs.csv", {"folder", "state", "reason"})
+        table = Table._read(self.folder / "runs.csv", {"folder", "state", "reason"})
+        return Table({**table, "index": table["index"].astype(np.int64)})
 
     @property
     def parameters(self) -> list[str]:
@@ -93,8 +94,7 @@ class Study:
     def to_pandas(self) -> Any:
         """`runs` as a DataFrame with the numbers of the runs as index."""
         pandas: Any = import_module("pandas")
-        runs = pandas.DataFrame(dict(self.runs))
-        return runs.astype({"index": "int64"}).set_index("index")
+        return pandas.DataFrame(dict(self.runs)).set_index("index")
 
     def _repr_html_(self) -> str:
         effects = self.effects._repr_html_() if (self.folder / "effects.csv").is_file() else ""
@@ -176,7 +176,7 @@ def _with_sample(content: dict[str, Any], sample: Any) -> dict[str, Any]:
         columns = list(array.T)
     listed = []
     for parameter, values in zip(parameters, columns):
-        own = {key: value for key, value in parameter.items() if key in ("name", "key", "whole")}
+        own = {key: value for key, value in parameter.items() if key in ("name", "key")}
         if parameter.get("whole"):
             values = values.astype(np.int64)
         listed.append({**own, "values": values.tolist()})
