@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _pilum
 from ._calibrate import Calibration, calibrate
-from ._errors import Error, InputError, LawError
+from ._errors import Error, InputError, LawError, NoEquilibriumError
 from ._merge import merged, variants
 from ._run import point, run
 
@@ -134,11 +134,11 @@ class CalibrationProblem:
         Weights are no information and do not count. It is -inf outside `bounds` and where a test has no answer.
         """
         scatter = self.scatter if scatter is None else scatter
+        if np.shape(theta) != self.start.shape:
+            raise InputError(f"theta has shape {np.shape(theta)}, expected {self.start.shape}")
         try:
             residuals = self.residuals(theta)
-        except Error as error:
-            if isinstance(error, InputError) and np.shape(theta) != self.start.shape:
-                raise
+        except (InputError, LawError, NoEquilibriumError):
             return -np.inf
         curves = [curve for test in self._tests for curve in test.curves]
         noise = np.concatenate([curve.noise for curve in curves]) * scatter
@@ -147,7 +147,7 @@ class CalibrationProblem:
         return float(-0.5 * squares - np.sum(np.log(noise)) - 0.5 * len(noise) * np.log(2 * np.pi))
 
     def __repr__(self) -> str:
-        points = sum(len(curve.at) for test in self._tests for curve in test.curves)
+        points = sum(test.points() for test in self._tests)
         return f"<pilum.CalibrationProblem of {', '.join(self.names)}: {points} points>"
 
     def _checked(self, theta: ArrayLike) -> _Values:
