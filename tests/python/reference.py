@@ -22,6 +22,8 @@ Dictionaries have the keys of [cases](../reference/case.md) and [drivers](../ref
 ORDER = [
     ("Laws", ["Law", "State", "describe", "laws", "point"]),
     ("Runs and their results", ["run", "Progress", "Results", "Table", "Fields", "Field"]),
+    ("Calibrations and studies", ["calibrate", "Calibration", "CalibrationProblem", "study", "Study"]),
+    ("Libraries, tables, reports", ["check", "Check", "table", "report"]),
     ("Problems, step by step", ["Problem", "Mesh", "Simulation", "Step", "SimulationState"]),
     ("Errors", ["Error", "InputError", "NoEquilibriumError", "LawError", "InternalError", "PilumWarning"]),
     ("Where things are", ["program", "include", "cases"]),

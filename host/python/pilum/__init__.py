@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 
 from . import _pilum
+from ._calibrate import Calibration, calibrate
 from ._errors import (
     Error,
     InputError,
@@ -19,16 +20,22 @@ from ._errors import (
     PilumWarning,
 )
 from ._fields import Field, Fields
+from ._fit_problem import CalibrationProblem
 from ._mesh import Mesh
 from ._pilum import Law, Simulation, SimulationState, State, describe, laws
 from ._results import Results
 from ._run import Problem, Progress, Step, point, run
+from ._study import Study, study
 from ._table import Table
+from ._tools import Check, check, report, table
 from ._where import _ready, cases, include, program
 
 __version__: str = _pilum.__version__
 
 __all__ = [
+    "Calibration",
+    "CalibrationProblem",
+    "Check",
     "Error",
     "Field",
     "Fields",
@@ -46,14 +53,20 @@ __all__ = [
     "SimulationState",
     "State",
     "Step",
+    "Study",
     "Table",
+    "calibrate",
     "cases",
+    "check",
     "describe",
     "include",
     "laws",
     "point",
     "program",
+    "report",
     "run",
+    "study",
+    "table",
 ]
 
 _ready()

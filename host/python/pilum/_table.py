@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -49,13 +49,19 @@ class Table(dict[str, NDArray[Any]]):
         return cls._of_rows(csv.reader(io.StringIO(text)))
 
     @classmethod
-    def _of_rows(cls, rows: Iterator[list[str]]) -> Table:
+    def _read(cls, path: Path, texts: Container[str]) -> Table:
+        """Reads a CSV file some of whose columns are texts, whatever they look like."""
+        with open(path, encoding="utf-8", newline="") as file:
+            return cls._of_rows(csv.reader(file), texts)
+
+    @classmethod
+    def _of_rows(cls, rows: Iterator[list[str]], texts: Container[str] = ()) -> Table:
         names = next(rows, [])
         # The row that a run is writing may not be whole yet.
         columns = list(zip(*(row for row in rows if len(row) == len(names))))
         if not columns:
             columns = [()] * len(names)
-        return cls({name: _array(name, values) for name, values in zip(names, columns)})
+        return cls({name: _array(name, values, name in texts) for name, values in zip(names, columns)})
 
     @property
     def names(self) -> list[str]:
@@ -118,9 +124,9 @@ def _short(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, (float, np.floating)) else str(value)
 
 
-def _array(name: str, values: tuple[str, ...]) -> NDArray[Any]:
+def _array(name: str, values: tuple[str, ...], is_text: bool) -> NDArray[Any]:
     """Numbers where all are numbers or nothing, else texts; names are texts."""
-    if name in _TEXTS:
+    if is_text or name in _TEXTS:
         return np.array(values, dtype=np.str_)
     try:
         numbers = np.array([value if value else "nan" for value in values], dtype=np.float64)

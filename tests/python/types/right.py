@@ -55,6 +55,18 @@ def steps(simulation: pilum.Simulation) -> None:
         assert_type(one["increment"] / one["of"], float)
 
 
+def fits() -> None:
+    found = pilum.calibrate("box.toml", set={"starts": 2})
+    assert_type(found, pilum.Calibration)
+    problem = pilum.CalibrationProblem("box.toml", calibration=found)
+    print(problem.residuals([1.0, 2.0]) @ problem.jacobian(problem.best))
+    assert_type(problem.log_likelihood(problem.start), float)
+    assert_type(pilum.study("study.toml", sample=[[1.0, 2.0]]).curves, pilum.Table)
+    assert_type(pilum.check("mepi").passed, bool)
+    assert_type(pilum.table(["a", "b"]), pilum.Table)
+    print(pilum.report("a", print=True).name)
+
+
 def errors() -> None:
     try:
         pilum.run("case.toml")
