@@ -120,7 +120,7 @@ soil = {{ law = "elastic", parameters = {{ young_modulus = 20e3, poisson_ratio =
 concrete = {{ law = "elastic", parameters = {{ young_modulus = 30e6, poisson_ratio = 0.2 }} }}
 skin = {{ law = "coulomb_joint", parameters = {{ normal_stiffness = 1e6, shear_stiffness = 1e5, cohesion = {cohesion}, friction_angle = 0.0, dilatancy_angle = 0.0 }} }}
 [groups]
-soil = {{ formulation = "solid", law = "soil", initial_stress = {{ x = -100.0, y = -100.0, z = -100.0 }} }}
+soil = {{ formulation = "solid", law = "soil", initial_stress = {{ stress_11 = -100.0, stress_22 = -100.0, stress_33 = -100.0 }} }}
 pile = {{ formulation = "solid", law = "concrete" }}
 shaft = {{ formulation = "zero_thickness", line = "shaft", law = "skin" }}
 [[supports]]

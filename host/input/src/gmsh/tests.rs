@@ -115,6 +115,7 @@ fn wanting(groups: &[&'static str], lines: &[&'static str]) -> Wanted<'static> {
         lines: lines.iter().copied().collect(),
         analysis: Analysis::PlaneStrain,
         scale: 1.0,
+        is_case: true,
     }
 }
 
