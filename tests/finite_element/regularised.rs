@@ -1,4 +1,4 @@
-//! Regularised corrections, where Newton iterations alternate between pieces of a law.
+//! Regularised corrections (`regularisation = true`), where Newton iterations alternate between pieces of a law.
 //!
 //! Goal        a pile pushed in sand that does not dilate finds equilibrium without cutting corners.
 //! Geometry    a pile of 1 m by 10 m in sand of 15 by 20 m, axisymmetric, 299 quads.
@@ -64,6 +64,7 @@ displacement = [{{ line = "head", z = -0.1 }}]
 [solver]
 force_tolerance = {tolerance}
 displacement_tolerance = 1e-2
+regularisation = true
 [probes]
 head = {{ line = "head", quantity = "reaction_z", scale = -1.0 }}
 "#
@@ -133,6 +134,8 @@ fixed = ["r", "z"]
 name = "push"
 increments = 10
 pressure = [{{ line = "head", value = {} }}]
+[solver]
+regularisation = true
 [probes]
 head = {{ line = "head", quantity = "displacement_z" }}
 "#,

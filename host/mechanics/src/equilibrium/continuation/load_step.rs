@@ -31,6 +31,8 @@ pub(super) struct LoadControl {
     guess: Option<Vec<f64>>,
     /// With a quasi-Newton matrix, and with others as long as slow corrections do.
     acceleration: Option<Acceleration>,
+    /// Whether they are wanted.
+    regularises: bool,
     pub(super) regularised: Regularised,
     pub(super) viscous: Viscous,
     /// Displacement increments that left the least out of balance, and how much, relative.
@@ -56,6 +58,7 @@ impl LoadControl {
             task,
             guess,
             acceleration: is_slow.then(Acceleration::default),
+            regularises: newton.settings.regularisation,
             regularised: Regularised::new(is_expected),
             viscous: Viscous::new(newton.settings, is_expected),
             least: None,
@@ -350,7 +353,7 @@ impl LoadControl {
 
     /// Whether regularised corrections may take over.
     fn may_regularise(&self) -> bool {
-        self.acceleration.is_none() && self.viscous.relaxes()
+        self.regularises && self.acceleration.is_none() && self.viscous.relaxes()
     }
 
     /// The state that a whole Newton correction leads to or, if that is not near enough, a regularised one.
