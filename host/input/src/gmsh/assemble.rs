@@ -396,8 +396,8 @@ impl Assembly<'_> {
                 }
             }
         }
-        let corners = sides.iter().zip(&is_corner).filter(|(_, is)| **is);
-        match corners.filter_map(|(side, _)| side.as_ref()).next() {
+        let mut corners = sides.iter().zip(&is_corner).filter(|(_, is)| **is);
+        match corners.find_map(|(side, _)| side.as_ref()) {
             Some(side) => self.corner_in_the_middle(side),
             None => Ok(sides),
         }
