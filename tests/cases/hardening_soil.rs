@@ -140,7 +140,11 @@ fn the_ground_hands_its_overconsolidation_to_the_law() {
             .value
     };
     for (name, given) in [("ocr", 2.0), ("pop", 10.0)] {
-        assert!((value(name) - given).abs() < 1e-12, "{name}: {}", value(name));
+        assert!(
+            (value(name) - given).abs() < 1e-12,
+            "{name}: {}",
+            value(name)
+        );
     }
     // Formula (21) of the law: σ_1c = 2 · 100 + 10 kPa, and the cap through (σ_1c, K_0 σ_1c, K_0 σ_1c).
     let stress = [-80.0, -100.0, -80.0, 0.0];
