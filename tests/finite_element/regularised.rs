@@ -1,6 +1,6 @@
 //! Regularised corrections (`regularisation = true`), where Newton iterations alternate between pieces of a law.
 //!
-//! Goal        a pile pushed in sand that does not dilate finds equilibrium without cutting corners.
+//! Goal        a pile pushed in sand that does not dilate finds equilibrium by regularised corrections alone.
 //! Geometry    a pile of 1 m by 10 m in sand of 15 by 20 m, axisymmetric, 299 quads.
 //! Boundary    rollers; the head is pushed by 0.1 m.
 //! Law         mohr_coulomb with φ = 36°, ψ = 0; coulomb_joint at shaft and base.

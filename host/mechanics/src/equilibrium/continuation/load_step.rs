@@ -31,7 +31,7 @@ pub(super) struct LoadControl {
     guess: Option<Vec<f64>>,
     /// With a quasi-Newton matrix, and with others as long as slow corrections do.
     acceleration: Option<Acceleration>,
-    /// Whether they are wanted.
+    /// Whether the settings want regularised corrections.
     regularises: bool,
     pub(super) regularised: Regularised,
     pub(super) viscous: Viscous,

@@ -27,7 +27,7 @@ const HALF: f64 = 0.5;
 const FIRST: f64 = 3.0;
 /// Newton iterations without a gain of a tenth after which regularised ones begin.
 const PATIENCE: usize = 4;
-/// Another Newton correction is tried after this many regularised ones in a row that did so.
+/// Another Newton correction is tried after this many regularised ones in a row that halved the residual.
 const HALVINGS: usize = 2;
 /// Corrections are even, as those of a constant speed, if the cosine between them and the ratio of their sizes are
 /// at least this, three times in a row.
@@ -84,7 +84,7 @@ impl Regularised {
         }
     }
 
-    /// Whether Newton corrections have to halve the residual from the start.
+    /// Whether Newton corrections are taken whole or not at all.
     pub(super) fn is_expected(&self) -> bool {
         self.is_expected || self.has_begun()
     }
