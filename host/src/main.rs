@@ -26,7 +26,7 @@ static ALLOCATOR: runs::memory::Allocator = runs::memory::Allocator;
 fn main() -> ExitCode {
     #[cfg(unix)]
     {
-        runs::memory::reserve();
+        runs::memory::keep_freed();
         law::child::ignore_file_limit();
     }
     runs::study::follow();

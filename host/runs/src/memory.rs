@@ -2,31 +2,32 @@
 //! too, and exit code 1. Rows that were written stay.
 //!
 //! An allocation that fails cannot be reported by the code that asked for it: it has no other way
-//! on. So the program's allocator gives back a reserve, says what there is to say, and ends the
+//! on. So the program's allocator says what there is to say, in memory that was set aside, and ends the
 //! process. Large pieces of work announce the memory they need.
 
 use crate::Error;
 use rustix::io::Errno;
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
+use std::cell::{Cell, UnsafeCell};
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::time::Duration;
 
-/// Pieces that are set aside for the last words, and the bytes of each: more than what the system's allocator asks the
-/// kernel for at least (`malloc(3)`: 1 MB).
-const N_PIECES: usize = 3;
-const PIECE: usize = 5 << 18;
+/// Bytes set aside for the last words: a summary is read and written again in them.
+const RESERVE: usize = 4 << 20;
 /// Bytes of the largest piece that is kept once it is given back: what glibc keeps at most, with its own.
 const LARGEST_KEPT: usize = (32 << 20) - (1 << 16);
 /// Exit code: the limit is the user's to raise.
 const CODE: u8 = 1;
 
-/// Buffer for the last message.
-static HELD: Mutex<[Vec<u8>; N_PIECES]> = Mutex::new([const { Vec::new() }; N_PIECES]);
+/// Memory for the thread that says the last words, and for no other.
+static HELD: Reserve = Reserve {
+    bytes: UnsafeCell::new([0; RESERVE]),
+    used: AtomicUsize::new(0),
+};
 /// Bytes that what goes on was expected to take in all.
 static EXPECTED: AtomicU64 = AtomicU64::new(0);
 /// What was announced with it.
@@ -45,59 +46,90 @@ thread_local! {
 #[derive(Debug)]
 pub struct Allocator;
 
-/// Ends the process if there is no memory. The thread that is ending it gets the memory set aside, piece by
-/// piece: other threads go on until they need memory, and may take it first.
-fn checked(size: usize, find: impl Fn() -> *mut u8) -> *mut u8 {
-    let mut found = find();
-    while found.is_null() {
-        if !IS_LAST.get() {
-            end(size);
-        }
-        if !give_back() {
+/// Memory that is given out once, from its beginning to its end.
+struct Reserve {
+    bytes: UnsafeCell<[u8; RESERVE]>,
+    used: AtomicUsize,
+}
+
+// SAFETY: `used` grows in one step, so that no byte is given out twice.
+unsafe impl Sync for Reserve {}
+
+impl Reserve {
+    /// A piece of it. The process ends if it is used up.
+    fn give(&self, layout: Layout) -> *mut u8 {
+        let start = self.bytes.get().cast::<u8>();
+        // What the alignment may cost is part of the piece.
+        let size = layout.size().saturating_add(layout.align());
+        let used = self.used.fetch_add(size, Ordering::Relaxed);
+        if used.saturating_add(size) > RESERVE {
             exit();
         }
-        found = find();
+        let piece = start.wrapping_add(used);
+        piece.wrapping_add(piece.align_offset(layout.align()))
+    }
+
+    fn has(&self, pointer: *mut u8) -> bool {
+        let start = self.bytes.get() as usize;
+        (start..start + RESERVE).contains(&(pointer as usize))
+    }
+}
+
+/// What was found, or the end of the process.
+fn checked(found: *mut u8, size: usize) -> *mut u8 {
+    if found.is_null() {
+        end(size);
     }
     found
 }
 
-// SAFETY: everything is the system's allocator's, with the same arguments; what is added neither
-// unwinds nor returns.
+// SAFETY: everything is the system's allocator's, with the same arguments, but for the thread that says the last
+// words: its pieces come from the reserve, are no one else's, and stay to the end. What is added neither unwinds nor
+// returns.
 unsafe impl GlobalAlloc for Allocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        if IS_LAST.get() {
+            return HELD.give(layout);
+        }
         // SAFETY: as the caller promises.
-        checked(layout.size(), || unsafe { System.alloc(layout) })
+        checked(unsafe { System.alloc(layout) }, layout.size())
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: as the caller promises.
-        unsafe { System.dealloc(pointer, layout) }
+        if !HELD.has(pointer) {
+            // SAFETY: as the caller promises.
+            unsafe { System.dealloc(pointer, layout) }
+        }
     }
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        if IS_LAST.get() {
+            // The reserve is zero until it is given out.
+            return HELD.give(layout);
+        }
         // SAFETY: as the caller promises.
-        checked(layout.size(), || unsafe { System.alloc_zeroed(layout) })
+        checked(unsafe { System.alloc_zeroed(layout) }, layout.size())
     }
 
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        if IS_LAST.get() {
+            let Ok(larger) = Layout::from_size_align(size, layout.align()) else {
+                return std::ptr::null_mut();
+            };
+            let piece = HELD.give(larger);
+            // SAFETY: both have as many bytes, and the new piece is apart from all others.
+            unsafe { piece.copy_from_nonoverlapping(pointer, layout.size().min(size)) };
+            return piece;
+        }
         // SAFETY: as the caller promises; what could not be had has left the piece as it was.
-        checked(size, || unsafe { System.realloc(pointer, layout, size) })
+        checked(unsafe { System.realloc(pointer, layout, size) }, size)
     }
-}
-
-/// Sets aside what the last words are reported in, and lets freed memory be used again.
-pub fn reserve() {
-    // Before freed memory is kept, so that giving it back gives it to whichever thread needs it.
-    if let Ok(mut held) = HELD.lock() {
-        held.fill_with(|| Vec::with_capacity(PIECE));
-    }
-    keep_freed();
 }
 
 /// Lets the system's allocator keep large freed pieces for the next ones: the kernel gives new memory page by
 /// page. The allocator of glibc keeps pieces no larger than the largest one ever freed, up to 32 MB
 /// (`mallopt(3)`, `M_MMAP_THRESHOLD`). Other allocators are unaffected.
-fn keep_freed() {
+pub fn keep_freed() {
     let Ok(layout) = Layout::array::<u8>(LARGEST_KEPT) else {
         return;
     };
@@ -163,16 +195,6 @@ fn shortage(size: u64) -> String {
     format!("not enough memory: {needed}{last}")
 }
 
-/// Gives back a piece of what was set aside. Whether there was one.
-fn give_back() -> bool {
-    // It is being set aside.
-    let Ok(mut held) = HELD.try_lock() else {
-        return false;
-    };
-    let piece = held.iter_mut().find(|piece| piece.capacity() > 0);
-    piece.map(std::mem::take).is_some()
-}
-
 /// The last words of the process.
 #[cold]
 fn end(size: usize) {
@@ -182,7 +204,6 @@ fn end(size: usize) {
         std::process::abort();
     }
     IS_LAST.set(true);
-    give_back();
     let message = shortage(size as u64);
     let text = format!(
         "error: {message}\n  |\n  = help: raise the limit of memory, or take a coarser mesh; rows that were written are whole\n"
