@@ -30,41 +30,39 @@ impl Pages {
         let inner = length.next_multiple_of(page).max(page);
         let place = match fence {
             Fence::Far => Place::Heap(Heap::new(length + 2 * page)),
-            Fence::After | Fence::Before => Place::Map(Map::new(inner + 2 * page)?),
+            Fence::After => Place::Map(Map::new(inner + 2 * page, Some(page + inner))?),
+            Fence::Before => Place::Map(Map::new(inner + 2 * page, Some(0))?),
         };
-        if let Place::Map(map) = &place {
-            let forbidden = if fence == Fence::After {
-                page + inner
-            } else {
-                0
-            };
-            map.forbid(forbidden, page)?;
-        }
         let offset = match fence {
             Fence::After => page + inner - length,
             Fence::Far | Fence::Before => page,
         };
-        Ok(Self {
+        let mut pages = Self {
             place,
             offset,
             length,
-        })
+        };
+        if fence != Fence::Far {
+            // They may have been used before.
+            pages.bytes_mut().fill(0);
+        }
+        Ok(pages)
     }
 
     /// From now on writing ends the process. Bytes of the heap move to their own pages.
     pub(super) fn lock(&mut self) -> io::Result<()> {
-        let page = page_size();
-        let inner = self.length.next_multiple_of(page).max(page);
         if let Place::Heap(_) = self.place {
+            let page = page_size();
+            let inner = self.length.next_multiple_of(page).max(page);
             let mut paged = Self {
-                place: Place::Map(Map::new(inner + 2 * page)?),
+                place: Place::Map(Map::new(inner + 2 * page, None)?),
                 ..*self
             };
             paged.bytes_mut().copy_from_slice(self.bytes());
             *self = paged;
         }
         match &mut self.place {
-            Place::Map(map) => map.lock(page, inner),
+            Place::Map(map) => map.lock(),
             Place::Heap(_) => Ok(()),
         }
     }
@@ -116,6 +114,7 @@ use of_unix::{Map, page_size};
 #[cfg(unix)]
 mod of_unix {
     use rustix::mm::{MapFlags, MprotectFlags, ProtFlags, mmap_anonymous, mprotect, munmap};
+    use std::cell::RefCell;
     use std::io;
     use std::ptr::null_mut;
 
@@ -123,23 +122,51 @@ mod of_unix {
         rustix::param::page_size()
     }
 
+    /// Maps that are kept for the next calls: a check makes ten thousands of them.
+    const MOST_SPARE: usize = 64;
+
+    thread_local! {
+        static SPARE: RefCell<Vec<Map>> = const { RefCell::new(Vec::new()) };
+    }
+
+    /// Pages between two margins of one page each.
     #[derive(Debug)]
     pub(super) struct Map {
         start: *mut u8,
         length: usize,
+        /// Where a page lies that must not be touched.
+        forbidden: Option<usize>,
         is_locked: bool,
     }
 
     impl Map {
-        pub(super) fn new(length: usize) -> io::Result<Self> {
+        /// One that was used before where there is one: its bytes are as they were left.
+        pub(super) fn new(length: usize, forbidden: Option<usize>) -> io::Result<Self> {
+            let spare = SPARE.try_with(|spare| {
+                let mut spare = spare.borrow_mut();
+                let fits = |map: &Self| (map.length, map.forbidden) == (length, forbidden);
+                spare.iter().position(fits).map(|i| spare.swap_remove(i))
+            });
             let access = ProtFlags::READ | ProtFlags::WRITE;
+            if let Ok(Some(mut map)) = spare {
+                if map.is_locked {
+                    map.protect_inner(MprotectFlags::READ | MprotectFlags::WRITE)?;
+                    map.is_locked = false;
+                }
+                return Ok(map);
+            }
             // SAFETY: a new private map at an address of the system's choice touches nothing else.
             let start = unsafe { mmap_anonymous(null_mut(), length, access, MapFlags::PRIVATE)? };
-            Ok(Self {
+            let map = Self {
                 start: start.cast(),
                 length,
+                forbidden,
                 is_locked: false,
-            })
+            };
+            if let Some(from) = forbidden {
+                map.protect(from, page_size(), MprotectFlags::empty())?;
+            }
+            Ok(map)
         }
 
         pub(super) fn start(&self) -> *mut u8 {
@@ -150,13 +177,13 @@ mod of_unix {
             self.is_locked
         }
 
-        pub(super) fn forbid(&self, from: usize, length: usize) -> io::Result<()> {
-            self.protect(from, length, MprotectFlags::empty())
+        pub(super) fn lock(&mut self) -> io::Result<()> {
+            self.is_locked = true;
+            self.protect_inner(MprotectFlags::READ)
         }
 
-        pub(super) fn lock(&mut self, from: usize, length: usize) -> io::Result<()> {
-            self.is_locked = true;
-            self.protect(from, length, MprotectFlags::READ)
+        fn protect_inner(&self, access: MprotectFlags) -> io::Result<()> {
+            self.protect(page_size(), self.length - 2 * page_size(), access)
         }
 
         fn protect(&self, from: usize, length: usize, access: MprotectFlags) -> io::Result<()> {
@@ -169,8 +196,18 @@ mod of_unix {
 
     impl Drop for Map {
         fn drop(&mut self) {
-            // SAFETY: the whole map, which nothing refers to any more. Failure leaks it.
-            let _ = unsafe { munmap(self.start.cast(), self.length) };
+            let kept = SPARE.try_with(|spare| {
+                let mut spare = spare.borrow_mut();
+                let fits = spare.len() < MOST_SPARE;
+                if fits {
+                    spare.push(Self { ..*self });
+                }
+                fits
+            });
+            if !kept.unwrap_or(false) {
+                // SAFETY: the whole map, which nothing refers to any more. Failure leaks it.
+                let _ = unsafe { munmap(self.start.cast(), self.length) };
+            }
         }
     }
 }
@@ -191,7 +228,7 @@ mod elsewhere {
 
     impl Map {
         #[expect(clippy::unnecessary_wraps, reason = "as on Unix")]
-        pub(super) fn new(length: usize) -> io::Result<Self> {
+        pub(super) fn new(length: usize, _: Option<usize>) -> io::Result<Self> {
             Ok(Self(super::Heap::new(length)))
         }
 
@@ -204,12 +241,7 @@ mod elsewhere {
         }
 
         #[expect(clippy::unused_self, clippy::unnecessary_wraps, reason = "as on Unix")]
-        pub(super) fn forbid(&self, _: usize, _: usize) -> io::Result<()> {
-            Ok(())
-        }
-
-        #[expect(clippy::unused_self, clippy::unnecessary_wraps, reason = "as on Unix")]
-        pub(super) fn lock(&mut self, _: usize, _: usize) -> io::Result<()> {
+        pub(super) fn lock(&mut self) -> io::Result<()> {
             Ok(())
         }
     }
