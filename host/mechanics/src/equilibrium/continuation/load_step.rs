@@ -4,7 +4,7 @@
 //! state; slow corrections are accelerated.
 
 use super::STEP_LENGTHS;
-use super::regularised::Regularised;
+use super::regularised::{Regularised, newton_leaves};
 use super::viscous::{Viscous, stands_still};
 use crate::equilibrium::newton::{
     Acceleration, Control, Correction, Iteration, LineSearch, Newton, Otherwise, State,
@@ -229,7 +229,10 @@ impl Control for LoadControl {
         if largest > STILL_MOVES || !newton.settings.method.is_newton() {
             return Ok(None);
         }
-        if self.regularised.has_begun() && !self.is_held(newton, &increment)? {
+        // Regularised corrections are small along a mechanism too.
+        if self.regularised.has_begun()
+            && newton_leaves(newton, &self.task, &increment)? > STILL_MOVES
+        {
             return Ok(None);
         }
         let at = (increment, self.task.period.1);
@@ -334,21 +337,6 @@ impl LoadControl {
         }
         iterations.push(taken);
         Ok(next)
-    }
-
-    /// Whether a Newton correction of a state stays near it. Regularised ones are small along a mechanism too.
-    ///
-    /// # Errors
-    /// The step is stopped, or a law fails.
-    fn is_held(&self, newton: &mut Newton<'_>, increment: &[f64]) -> Result<bool, StepFailure> {
-        let balance = newton.evaluate(increment, &self.task, Operator::Consistent)?;
-        let correction = newton
-            .prepare(increment, &self.task)
-            .and_then(|_| newton.correction_of(&balance));
-        match correction {
-            Err(failure) if failure.is_singular() => Ok(false),
-            correction => Ok(norm(&correction?) <= STILL_MOVES * norm(increment)),
-        }
     }
 
     /// Whether regularised corrections may take over.

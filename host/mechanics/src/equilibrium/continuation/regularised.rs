@@ -11,7 +11,8 @@
 //!
 //! A regularised correction is smaller than the error, so its size alone accepts nothing. If the last corrections
 //! shrink by a factor ρ < 1 each, those to come add up to ρ/(1 − ρ) times the last one, and that is held against the
-//! tolerance. A body that moves on at constant speed (ρ = 1: a mechanism, until other points yield or unload) is in no
+//! tolerance. A whole Newton correction of that state must not be larger than the increment: it sees a mode that
+//! regularised corrections follow slowly. A body that moves on at constant speed (ρ = 1: a mechanism, until other points yield or unload) is in no
 //! equilibrium, however small its residual. It is followed by long moves along the same correction.
 
 use crate::equilibrium::newton::{
@@ -39,6 +40,8 @@ const GROWTH: f64 = 3.0;
 const LONGEST: f64 = 0.5;
 /// A long move may raise the residual by this factor, and up to the tolerance.
 const RISE: f64 = 1.2;
+/// A whole Newton correction of an equilibrium is at most this many times as large as the increment.
+const HELD: f64 = 1.0;
 /// Regularised corrections of a step, and those without a gain of a tenth that are a standstill.
 const MOST: usize = 80;
 const STANDSTILL: usize = 60;
@@ -215,7 +218,8 @@ impl Regularised {
         self.halvings = if halves { self.halvings + 1 } else { 0 };
         self.has_settled = length >= 1.0
             && next.balance.relative <= newton.settings.force_tolerance
-            && self.is_near(&taken, newton.settings.displacement_tolerance);
+            && self.is_near(&taken, newton.settings.displacement_tolerance)
+            && newton_leaves(newton, task, &next.increment)? <= HELD;
         newton.kept.contraction = f64::INFINITY;
         Ok((taken, next))
     }
@@ -239,6 +243,25 @@ impl Regularised {
             && taken
                 .correction
                 .is_some_and(|size| left * size <= tolerance)
+    }
+}
+
+/// Size of a whole Newton correction of a state, relative to its increment; infinite if the tangent is singular.
+///
+/// # Errors
+/// The step is stopped, or a law fails.
+pub(super) fn newton_leaves(
+    newton: &mut Newton<'_>,
+    task: &Task,
+    increment: &[f64],
+) -> Result<f64, StepFailure> {
+    let balance = newton.evaluate(increment, task, Operator::Consistent)?;
+    let correction = newton
+        .prepare(increment, task)
+        .and_then(|_| newton.correction_of(&balance));
+    match correction {
+        Err(failure) if failure.is_singular() => Ok(f64::INFINITY),
+        correction => Ok(norm(&correction?) / norm(increment).max(f64::MIN_POSITIVE)),
     }
 }
 
