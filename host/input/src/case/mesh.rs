@@ -4,6 +4,7 @@ use super::one;
 use crate::schema;
 use schemars::JsonSchema;
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use text::Named;

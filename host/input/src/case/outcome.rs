@@ -5,6 +5,7 @@ use crate::schema;
 use results::output_request::Reduce;
 use schemars::JsonSchema;
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use text::Named;
 use toml::Spanned;

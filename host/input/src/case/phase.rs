@@ -6,6 +6,7 @@ use crate::schema;
 use mechanics::problem::Drainage;
 use schemars::JsonSchema;
 use serde::Deserialize;
+use std::collections::BTreeMap;
 use text::Named;
 use toml::Spanned;
 
