@@ -271,11 +271,9 @@ impl System {
         }
         let maps = |(number, group): (usize, &Group)| -> Vec<ElementMap> {
             let kinematics = &group.kinematics;
-            let takes_part = takes_part(number, group);
-            let elements = 0..usize::from(takes_part) * kinematics.n_elements();
-            elements
-                .map(|element| ElementMap::new(kinematics.nodes(element), &tie_of, ties))
-                .collect()
+            let map = |element| ElementMap::new(kinematics.nodes(element), &tie_of, ties);
+            let n = usize::from(takes_part(number, group)) * kinematics.n_elements();
+            (0..n).map(map).collect()
         };
         let elements: Vec<_> = groups.iter().enumerate().map(maps).collect();
         let numbered = groups.iter().enumerate();

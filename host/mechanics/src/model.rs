@@ -31,7 +31,7 @@ pub struct Model {
     /// Mid-thickness nodes that follow the two faces of a thin layer.
     pub ties: Vec<Tie>,
     /// For every phase but the first, the groups that take another law.
-    pub swaps: Vec<Vec<(usize, Material)>>,
+    pub swaps: Swaps,
     /// Warnings about implausible input.
     pub warnings: Vec<String>,
 }
@@ -66,9 +66,12 @@ pub fn hypothesis(
     }
 }
 
+/// Groups that take other laws, by phase.
+type Swaps = Vec<Vec<(usize, Material)>>;
+
 /// The laws that groups start with and those that later phases swap them for. A phase's laws hold from it on; the
 /// first phase's replace those of the groups at once.
-fn materials(problem: &Problem) -> Result<(Vec<Material>, Vec<Vec<(usize, Material)>>), Refusal> {
+fn materials(problem: &Problem) -> Result<(Vec<Material>, Swaps), Refusal> {
     let mut swaps = vec![Vec::new(); problem.phases.len()];
     let mut first = Vec::new();
     for (number, group) in problem.groups.iter().enumerate() {

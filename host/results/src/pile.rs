@@ -346,7 +346,6 @@ impl Pile {
         }
         let geometry = &self.geometry;
         let (split, weights) = self.split(snapshot, &there);
-        let weight: f64 = weights.iter().map(|(_, weight)| weight).sum();
         let y = |node: &usize| snapshot.displacement[2 * node + 1];
         let settlement =
             |nodes: &[usize]| -nodes.iter().map(y).sum::<f64>() / nodes.len().max(1) as f64;
@@ -355,24 +354,23 @@ impl Pile {
             shaft: split.shaft,
             base: split.base,
             settlement: settlement(&geometry.rows[0].nodes),
-            weight,
+            weight: weights.iter().map(|(_, weight)| weight).sum(),
         };
         let along = friction::along(snapshot, geometry, &split);
         let last = geometry.rows.len() - 1;
         let station = |(number, row): (usize, &Row)| {
-            let z = row.z;
             let axial_force = match number {
                 0 => loads.head,
                 _ if number == last => loads.base,
                 _ => {
-                    let above = split.above(z, snapshot) + self.bend(row, &along);
-                    loads.head + self.weight_above(snapshot, &weights, z) - above
+                    let above = split.above(row.z, snapshot) + self.bend(row, &along);
+                    loads.head + self.weight_above(snapshot, &weights, row.z) - above
                 }
             };
             let mut parts = row.at.iter();
             let held = parts.find_map(|&(span, part)| along[span].map(|held| held[part]));
             Station {
-                z,
+                z: row.z,
                 axial_force,
                 shaft_friction: held.map(|held| held[0]),
                 normal_stress: held.map(|held| held[1]),

@@ -142,16 +142,13 @@ pub fn merged<T: DeserializeOwned>(source: &Source) -> Result<Variants<T>, Error
         .collect::<Result<Vec<_>, _>>()?;
     let mut merged = together(source, &files)?;
     let Some(variants) = merged.get_mut().remove("variant") else {
-        return Ok(vec![(
-            None,
-            with_settings(source, merged, &settings, None)?,
-        )]);
+        let file = with_settings(source, merged, &settings, None)?;
+        return Ok(vec![(None, file)]);
     };
     let span = variants.span();
     let DeValue::Array(variants) = variants.into_inner() else {
-        return Err(source
-            .error(span, "variants are written as [[variant]]")
-            .into());
+        let error = source.error(span, "variants are written as [[variant]]");
+        return Err(error.into());
     };
     if variants.len().saturating_mul(source.text().len()) > MOST_TOGETHER {
         let message = format!(

@@ -42,7 +42,7 @@ impl Load<'_> {
         problem: &Problem,
         phase: &Phase,
         size: f64,
-        (lost, all): (&[(usize, usize)], &[(usize, usize)]),
+        [lost, all]: [&[(usize, usize)]; 2],
     ) -> String {
         let mesh = &problem.mesh;
         let analysis = problem.analysis;
@@ -150,7 +150,7 @@ fn lost(
     if lost.is_empty() || size == 0.0 {
         return Ok(None);
     }
-    let edges = (&lost[..], &own.edges[..]);
+    let edges = [&lost[..], &own.edges[..]];
     Ok(Some(load.part_lost(problem, &phases[number], size, edges)))
 }
 /// The components in which an edge with these ends and middle faces.

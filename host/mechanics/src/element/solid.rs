@@ -67,20 +67,6 @@ pub struct BadShape {
     pub element: usize,
 }
 
-/// At each point of a rule the functions that strains are projected on: linear in the coordinates, and beyond.
-fn basis<const N: usize, F: IntoIterator<Item = f64>>(
-    rule: &[RulePoint],
-    points: &[Point<N>],
-    beyond_linear: impl Fn([f64; 2]) -> F,
-) -> Vec<Vec<f64>> {
-    let both = rule.iter().zip(points);
-    both.map(|(at, point)| {
-        let linear = [1.0, point.position[0], point.position[1]];
-        linear.into_iter().chain(beyond_linear(at.at)).collect()
-    })
-    .collect()
-}
-
 /// What follows from the nodes of one element.
 struct Geometry<const N: usize> {
     points: Vec<Point<N>>,
@@ -201,7 +187,8 @@ impl<const N: usize> Geometry<N> {
             let functions = reference.functions.as_ref()?;
             if is_curved {
                 let basis = |rule: &[RulePoint], points: &[Point<N>]| {
-                    basis(rule, points, |at| (functions.beyond_linear)(along, at))
+                    let beyond_linear = |at| (functions.beyond_linear)(along, at);
+                    projection::basis(rule, points, beyond_linear)
                 };
                 let (at_own, at_fine) = (basis(&rule, &own), basis(&exact, &fine));
                 let values = projection::cardinal(&at_own, &at_fine)?;

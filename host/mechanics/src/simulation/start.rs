@@ -54,8 +54,7 @@ impl Simulation {
         for (group, law) in self.swaps[number].clone() {
             starts[group] = true;
             self.groups[group].moment = moment;
-            let parted = self.groups[group].set_law(law).map_err(cannot_start)?;
-            if let Some(parted) = parted {
+            if let Some(parted) = self.groups[group].set_law(law).map_err(cannot_start)? {
                 watch.warning(&Warning::GroupSplit(phase.name.clone(), parted));
             }
         }

@@ -145,10 +145,8 @@ impl History {
         let [phase, increment, time] = needed.map(|name| table.position(name).unwrap_or_default());
         let all = 0..table.columns().len();
         let columns: Vec<usize> = all.filter(|c| ![phase, increment].contains(c)).collect();
-        let names = columns
-            .iter()
-            .map(|&c| table.columns()[c].clone())
-            .collect();
+        let name = |&column: &usize| table.columns()[column].clone();
+        let names = columns.iter().map(name).collect();
         let time_at = columns.iter().position(|&column| column == time);
         let mut phases: Vec<String> = Vec::new();
         let mut of_row: Vec<usize> = Vec::new();
@@ -166,10 +164,8 @@ impl History {
         })?;
         let n = of_row.len();
         let of_rows = of_row.iter().map(|&phase| phases[phase].as_str());
-        let times = Times::new(
-            of_rows.zip(increments.iter().copied()),
-            time_at.map(|at| &values[at][..]),
-        );
+        let of_rows = of_rows.zip(increments.iter().copied());
+        let times = Times::new(of_rows, time_at.map(|at| &values[at][..]));
         let finite = |value: f64| value.is_finite().then_some(value);
         let is_last = |&row: &usize| of_row.get(row + 1) != Some(&of_row[row]);
         let last_rows: Vec<usize> = (0..n).filter(is_last).collect();
