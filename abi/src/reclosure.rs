@@ -1,6 +1,8 @@
 //! For authors of interface laws whose faces part: what of an increment acts once they touch again.
 //! A law need not use it.
 
+use crate::law::InterfaceResponse;
+
 /// The part of an increment in contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InContact {
@@ -13,6 +15,43 @@ pub struct InContact {
 }
 
 impl InContact {
+    /// The traction, kPa, from which a point goes on in contact, and the part of its increment Δ⟦u⟧ there: without
+    /// stress after it has closed a gap g > 0, else from its `traction` throughout.
+    ///
+    /// # Errors
+    /// The gap at the end, if it does not close.
+    #[inline]
+    pub fn from(
+        gap: f64,
+        traction: [f64; 2],
+        jump_increment: [f64; 2],
+    ) -> Result<([f64; 2], Self), f64> {
+        if gap > 0.0 {
+            return Ok(([0.0; 2], Self::after_closure(gap, jump_increment)?));
+        }
+        Ok((traction, Self::throughout(jump_increment)))
+    }
+
+    /// The response of a law whose `tangent` is by what acts in contact, opening and slip.
+    #[inline]
+    pub fn response<S>(
+        &self,
+        traction: [f64; 2],
+        state: S,
+        [[a, b], [c, d]]: [[f64; 2]; 2],
+    ) -> InterfaceResponse<S> {
+        let [by_normal, by_tangential] = self.slip_by_jump;
+        InterfaceResponse {
+            traction,
+            state,
+            tangent: [
+                [a + b * by_normal, b * by_tangential],
+                [c + d * by_normal, d * by_tangential],
+            ],
+            unreliable: None,
+        }
+    }
+
     /// The whole increment of a point whose faces touch from its start on.
     #[inline]
     pub fn throughout([opening, slip]: [f64; 2]) -> Self {

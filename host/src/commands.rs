@@ -49,21 +49,13 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
         Command::Man { into: None } => manual(&Arguments::command()),
         Command::Man { into: Some(folder) } => manuals(&folder),
         Command::Inspect { library, json } => show_library(&library, json),
-        Command::Lock { input } => {
-            let lock = input::lock::write(&opener, &input)?;
-            print(&format!("lock in {}\n", lock.display()))
-        }
+        Command::Lock { input } => lock(&opener, &input),
         Command::Replay {
             capsule,
             record,
             reached,
             ..
-        } => recorded(record.as_deref(), opener, |opener| {
-            printing(|out| {
-                let say = &mut |line: &str| out.line(line);
-                workshop::replay::replay(&capsule, opener, reached.as_deref(), say)
-            })
-        }),
+        } => replay(&capsule, record.as_deref(), opener, reached.as_deref()),
         #[cfg(unix)]
         Command::LawWorker => Ok(law::isolate::work()?),
         #[cfg(not(unix))]
@@ -135,6 +127,25 @@ fn show_library(library: &Path, json: bool) -> Result<(), Error> {
 
 /// Does something while one call of a UMAT is recorded, if a file for it is given, and says whether
 /// it was.
+fn lock(opener: &Opener, input: &Path) -> Result<(), Error> {
+    let lock = input::lock::write(opener, input)?;
+    print(&format!("lock in {}\n", lock.display()))
+}
+
+fn replay(
+    capsule: &Path,
+    record: Option<&Path>,
+    opener: Opener,
+    reached: Option<&Path>,
+) -> Result<(), Error> {
+    recorded(record, opener, |opener| {
+        printing(|out| {
+            let say = &mut |line: &str| out.line(line);
+            workshop::replay::replay(capsule, opener, reached, say)
+        })
+    })
+}
+
 fn recorded(
     file: Option<&Path>,
     opener: Opener,

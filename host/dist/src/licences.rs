@@ -27,7 +27,6 @@ pub(crate) fn write(
     library: Option<&str>,
     folder: &Path,
 ) -> Result<(), Error> {
-    let linked = metadata.linked(library);
     let mut list = format!(
         "Pilum {} is free software under the MIT licence or the Apache licence 2.0, at your choice: \
          LICENSE-MIT and\nLICENSE-APACHE beside this file. Program and laws contain the standard library of \
@@ -37,17 +36,16 @@ pub(crate) fn write(
     );
     // Texts, with those who have them.
     let mut texts: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    let linked = metadata.linked(library);
     for package in linked.iter().filter(|package| package.is_foreign) {
         let Package { name, version, .. } = package;
         let address = package.repository.as_deref().unwrap_or("");
         let _ = writeln!(list, "{name} {version}: {}  {address}", package.licence);
         let files = files(&package.folder)?;
         if files.is_empty() {
-            let authors = package.authors.join(", ");
-            let by = if authors.is_empty() {
-                "its authors"
-            } else {
-                &authors
+            let by = match package.authors.join(", ") {
+                authors if authors.is_empty() => "its authors".to_owned(),
+                authors => authors,
             };
             let _ = writeln!(
                 list,
@@ -55,32 +53,33 @@ pub(crate) fn write(
             );
         }
         for path in files {
-            let text = fs::read_to_string(&path).map_err(Error::of(&path))?;
-            let text = text.replace('\r', "").trim_end().to_owned();
-            texts
-                .entry(text)
-                .or_default()
-                .push(format!("{name} {version}"));
+            let of = texts.entry(text_of(&path)?).or_default();
+            of.push(format!("{name} {version}"));
         }
     }
     let uplot = repository.join("host/results/src/report/vendor/LICENSE-uPlot");
-    let text = fs::read_to_string(&uplot).map_err(Error::of(&uplot))?;
-    texts
-        .entry(text.trim_end().to_owned())
-        .or_default()
-        .push("uPlot".to_owned());
+    let of = texts.entry(text_of(&uplot)?).or_default();
+    of.push("uPlot".to_owned());
     for (text, of) in texts {
         let line = "-".repeat(100);
         let _ = write!(list, "\n{line}\n{}:\n\n{text}\n", of.join(", "));
     }
     let to = folder.join("licences.txt");
     fs::write(&to, list).map_err(Error::of(&to))?;
+    copy_of_rust(repository, folder)
+}
 
-    let sysroot = output(
-        Command::new("rustc")
-            .args(["--print", "sysroot"])
-            .current_dir(repository),
-    )?;
+/// The text of a licence.
+fn text_of(path: &Path) -> Result<String, Error> {
+    let text = fs::read_to_string(path).map_err(Error::of(path))?;
+    Ok(text.replace('\r', "").trim_end().to_owned())
+}
+
+/// Copies the licences of Rust's own library, if the toolchain has them.
+fn copy_of_rust(repository: &Path, folder: &Path) -> Result<(), Error> {
+    let mut rustc = Command::new("rustc");
+    let rustc = rustc.args(["--print", "sysroot"]).current_dir(repository);
+    let sysroot = output(rustc)?;
     let sysroot = PathBuf::from(String::from_utf8_lossy(&sysroot).trim_end());
     let of_rust = sysroot.join("share/doc/rust/COPYRIGHT-library.html");
     if of_rust.is_file() {

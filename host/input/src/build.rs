@@ -22,7 +22,7 @@ use law::{BuiltLaw, Pins, SearchPath, hexadecimal_sha256};
 use mechanics::Simulation;
 use mechanics::check::{Cause, Item};
 use mechanics::mesh::{Line, Mesh};
-use mechanics::problem::{ElementGroup, Ground, Material, Phase, Problem, Support};
+use mechanics::problem::{ElementGroup, Ground, Material, Phase, Problem, Support, Water};
 use mechanics::settings::Control;
 use mechanics::simulation::Warning;
 use results::{About, OutputRequest};
@@ -88,26 +88,11 @@ impl Case {
             mesh,
             file: mesh_file,
         } = mesh::build(source, file)?;
-        let pins = file.laws.values().map(Spanned::get_ref);
-        let pins = Pins::of(source, pins.map(|law| (&law.law, law.sha256.as_ref())))?;
-        let search = SearchPath::of(&self.opener, &self.law_folders()?).pinned(pins);
         let water = file.water.as_ref();
         let water = water
             .map(|water| water.get_ref().read(source))
             .transpose()?;
-        let groups = file.groups.values();
-        let ground = groups.map(|group| ground(source, group.get_ref()));
-        let mut shelf = LawShelf {
-            source,
-            file,
-            search,
-            laws: IndexMap::new(),
-            mesh: &mesh,
-            water: water.as_ref(),
-            ground: ground.collect::<Result<_, Error>>()?,
-            opened: RefCell::default(),
-            grounds: RefCell::default(),
-        };
+        let mut shelf = self.shelf(&mesh, water.as_ref())?;
         refuse_unknown_groups(source, file)?;
         refuse_mesh_without_accuracy(source, file)?;
         let phases = file.phases.iter().map(|input| phase(source, file, input));
@@ -145,6 +130,30 @@ impl Case {
                 .chain(spare)
                 .collect(),
             mesh_file,
+        })
+    }
+
+    /// The laws that groups take, none of them opened yet.
+    fn shelf<'a>(
+        &'a self,
+        mesh: &'a Mesh,
+        water: Option<&'a Water>,
+    ) -> Result<LawShelf<'a>, Error> {
+        let Self { source, file, .. } = self;
+        let pins = file.laws.values().map(Spanned::get_ref);
+        let pins = Pins::of(source, pins.map(|law| (&law.law, law.sha256.as_ref())))?;
+        let groups = file.groups.values();
+        let ground = groups.map(|group| ground(source, group.get_ref()));
+        Ok(LawShelf {
+            source,
+            file,
+            search: SearchPath::of(&self.opener, &self.law_folders()?).pinned(pins),
+            laws: IndexMap::new(),
+            mesh,
+            water,
+            ground: ground.collect::<Result<_, Error>>()?,
+            opened: RefCell::default(),
+            grounds: RefCell::default(),
         })
     }
 

@@ -11,9 +11,8 @@ mod overview;
 pub use overview::{Overview, overview};
 
 use crate::Error;
-use crate::case::CaseFile;
+use crate::case::{CaseFile, MeshInput};
 use crate::mesh::MeshFile;
-use assemble::Assembled;
 use contents::Contents;
 use indexmap::IndexMap;
 use law::hexadecimal_sha256;
@@ -64,6 +63,19 @@ fn refuse_divided_layers(source: &Source, file: &CaseFile) -> Result<(), Error> 
     Err(source.error(name.span(), message).into())
 }
 
+/// Metres in a unit of the file.
+fn scale(source: &Source, input: &MeshInput) -> Result<f64, Error> {
+    let Some(key) = &input.scale else {
+        return Ok(1.0);
+    };
+    let scale = *key.get_ref();
+    if scale > 0.0 && scale.is_finite() {
+        return Ok(scale);
+    }
+    let message = format!("`scale` is {scale}, expected a positive number");
+    Err(source.error(key.span(), message).into())
+}
+
 /// The mesh of a case that names a file, divided as often as the case says, with notes for the user.
 ///
 /// # Errors
@@ -78,13 +90,7 @@ pub(crate) fn mesh(
     if input.divisions > 0 {
         refuse_divided_layers(source, file)?;
     }
-    let scale = input.scale.as_ref().map_or(1.0, |scale| *scale.get_ref());
-    if let Some(key) = &input.scale
-        && !(scale > 0.0 && scale.is_finite())
-    {
-        let message = format!("`scale` is {scale}, expected a positive number");
-        return Err(source.error(key.span(), message).into());
-    }
+    let scale = scale(source, input)?;
     let folder = source.path_at(&written.span()).parent();
     let path = folder.unwrap_or(Path::new(".")).join(written.get_ref());
     let unreadable = |why: io::Error| Error::from(unreadable(&path, why));
@@ -109,20 +115,17 @@ pub(crate) fn mesh(
     };
     let contents = contents.map_err(wrong)?;
     let wanted = wanted(source, file, scale, &contents, &path)?;
-    let Assembled {
-        mut mesh,
-        kept,
-        notes,
-        ..
-    } = assemble::assemble(&contents, &wanted).map_err(wrong)?;
+    let assembled = assemble::assemble(&contents, &wanted).map_err(wrong)?;
+    let mut mesh = assembled.mesh;
     for _ in 0..input.divisions {
         mesh = mesh.refined();
     }
     let name = path.display().to_string();
-    let notes = notes.into_iter().map(|note| format!("{name}: {note}"));
+    let notes = assembled.notes.into_iter();
+    let notes = notes.map(|note| format!("{name}: {note}"));
     let file = MeshFile {
         notes: notes.collect(),
-        kept,
+        kept: assembled.kept,
         sha256: hexadecimal_sha256(&bytes),
         path: name,
     };
@@ -175,24 +178,20 @@ fn wanted<'c>(
         if group.get_ref().formulation == Formulation::ZeroThickness {
             continue;
         }
-        let n_elements = surfaces.get(name.get_ref());
-        if n_elements == Some(&0) && !contents.cursor.is_of_arrays {
-            let message = format!(
-                "{} has no element in the physical surface `{}`",
-                path.display(),
-                name.get_ref()
-            );
-            let hint = "in format 2.2 `Mesh.SaveAll = 1` writes elements without their groups: take \
-                        format 4.1, or `Mesh.SaveAll = 0`";
-            return Err(source.error(name.span(), message).hint(hint).into());
-        }
-        if n_elements.is_none() {
-            let message = format!(
-                "{} has no physical surface `{}`",
-                path.display(),
-                name.get_ref()
-            );
-            let hint = known(name.get_ref(), &[(&surfaces, "element", "elements")]);
+        let missing = match surfaces.get(name.get_ref()) {
+            None => {
+                let hint = known(name.get_ref(), &[(&surfaces, "element", "elements")]);
+                Some(("physical surface", hint))
+            }
+            Some(0) if !contents.cursor.is_of_arrays => {
+                let hint = "in format 2.2 `Mesh.SaveAll = 1` writes elements without their groups: \
+                            take format 4.1, or `Mesh.SaveAll = 0`";
+                Some(("element in the physical surface", hint.to_owned()))
+            }
+            Some(_) => None,
+        };
+        if let Some((what, hint)) = missing {
+            let message = format!("{} has no {what} `{}`", path.display(), name.get_ref());
             return Err(source.error(name.span(), message).hint(hint).into());
         }
         wanted.groups.insert(name.get_ref(), number);

@@ -232,19 +232,14 @@ fn grid_line(grid: &[f64], at: f64, tolerance: f64) -> Result<usize, String> {
 /// Edges (or the node) of the mesh on a line.
 fn find_line(mesh: &Mesh, grids: [&[f64]; 2], line: &LineInput) -> Result<Line, String> {
     let tolerance = tolerance(grids);
-    let on = |node: usize| {
-        [line.x, line.y]
-            .iter()
-            .zip(mesh.nodes[node])
-            .all(|(wanted, at)| match wanted {
-                None => true,
-                Some(Coordinate::At(position)) => (at - position).abs() <= tolerance,
-                Some(Coordinate::Between([from, to])) => {
-                    at >= from - tolerance && at <= to + tolerance
-                }
-            })
+    let within = |(wanted, at): (Option<Coordinate>, f64)| match wanted {
+        None => true,
+        Some(Coordinate::At(position)) => (at - position).abs() <= tolerance,
+        Some(Coordinate::Between([from, to])) => at >= from - tolerance && at <= to + tolerance,
     };
-    for (coordinate, grid) in [line.x, line.y].into_iter().zip(grids) {
+    let wanted = [line.x, line.y];
+    let on = |node: usize| wanted.into_iter().zip(mesh.nodes[node]).all(within);
+    for (coordinate, grid) in wanted.into_iter().zip(grids) {
         if let Some(Coordinate::Between([from, to])) = coordinate {
             let from = grid_line(grid, from, tolerance)?;
             if from >= grid_line(grid, to, tolerance)? {
@@ -259,8 +254,8 @@ fn find_line(mesh: &Mesh, grids: [&[f64]; 2], line: &LineInput) -> Result<Line, 
                 return Err("there is no node at this point".to_owned());
             }
             Ok(Line {
-                edges: Vec::new(),
                 nodes,
+                ..Line::default()
             })
         }
         (Some(Coordinate::At(at)), _) | (_, Some(Coordinate::At(at))) => {
@@ -268,21 +263,18 @@ fn find_line(mesh: &Mesh, grids: [&[f64]; 2], line: &LineInput) -> Result<Line, 
             grid_line(grids[usize::from(!along_y)], at, tolerance)?;
             let is_on: Vec<bool> = (0..mesh.nodes.len()).map(on).collect();
             let touches = |quad: &Solid| quad.nodes().iter().any(|&node| is_on[node]);
-            let mut edges = Vec::new();
+            let mut line = Line::default();
             for (q, quad) in mesh.solids.iter().enumerate().filter(|(_, s)| touches(s)) {
                 for (e, edge) in quad.edges().enumerate() {
                     if edge.into_iter().all(|node| is_on[node]) {
-                        edges.push((q, e));
+                        line.edges.push((q, e));
                     }
                 }
             }
-            if edges.is_empty() {
+            if line.edges.is_empty() {
                 return Err("no edge of an element lies on it".to_owned());
             }
-            Ok(Line {
-                edges,
-                nodes: Vec::new(),
-            })
+            Ok(line)
         }
         _ => Err("one coordinate must be a number, such as `x = 0.0`".to_owned()),
     }

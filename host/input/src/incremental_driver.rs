@@ -186,28 +186,7 @@ fn segments(source: &Source) -> Result<Vec<Segment>, Error> {
         }
         let first = steps.len();
         if keyword == "*Repetition" {
-            let (at, [n_steps, n_times]) = lines.numbers("number of steps and of repetitions")?;
-            let n_steps = lines.whole(&at, n_steps, "the number of steps")?;
-            let n_times = lines.whole(&at, n_times, "the number of repetitions")?;
-            if n_steps == 0 || n_times == 0 {
-                return lines.refuse(at, "at least one step is repeated at least once");
-            }
-            for _ in 0..n_steps {
-                let (at, line) = lines.expect("a step that is repeated")?;
-                let name = self::keyword(&lines, &at, line)?;
-                steps.push(step(&mut lines, at, name)?);
-            }
-            let repeated = steps[first..].to_vec();
-            let each: usize = repeated.iter().map(|step: &Step| step.increments).sum();
-            if each.saturating_mul(n_times).saturating_add(total) > MAX_INCREMENTS {
-                return lines.refuse(at, format!("more than {MAX_INCREMENTS} increments"));
-            }
-            if repeated.len().saturating_mul(n_times) > MAX_SEGMENTS {
-                return lines.refuse(at, format!("more than {MAX_SEGMENTS} steps"));
-            }
-            for _ in 1..n_times {
-                steps.extend_from_slice(&repeated);
-            }
+            repetition(&mut lines, total, &mut steps)?;
         } else {
             steps.push(step(&mut lines, at.clone(), keyword)?);
         }
@@ -279,6 +258,33 @@ fn refuse_other_keywords(lines: &Lines<'_>, at: Range<usize>, keyword: &str) -> 
     Ok(())
 }
 
+/// Reads steps and appends them as often as they are repeated. There are `total` increments before them.
+fn repetition(lines: &mut Lines<'_>, total: usize, steps: &mut Vec<Step>) -> Result<(), Error> {
+    let (at, [n_steps, n_times]) = lines.numbers("number of steps and of repetitions")?;
+    let n_steps = lines.whole(&at, n_steps, "the number of steps")?;
+    let n_times = lines.whole(&at, n_times, "the number of repetitions")?;
+    if n_steps == 0 || n_times == 0 {
+        return lines.refuse(at, "at least one step is repeated at least once");
+    }
+    let mut repeated = Vec::new();
+    for _ in 0..n_steps {
+        let (at, line) = lines.expect("a step that is repeated")?;
+        let name = keyword(lines, &at, line)?;
+        repeated.push(step(lines, at, name)?);
+    }
+    let each: usize = repeated.iter().map(|step| step.increments).sum();
+    if each.saturating_mul(n_times).saturating_add(total) > MAX_INCREMENTS {
+        return lines.refuse(at, format!("more than {MAX_INCREMENTS} increments"));
+    }
+    if repeated.len().saturating_mul(n_times) > MAX_SEGMENTS {
+        return lines.refuse(at, format!("more than {MAX_SEGMENTS} steps"));
+    }
+    for _ in 0..n_times {
+        steps.extend_from_slice(&repeated);
+    }
+    Ok(())
+}
+
 fn step(lines: &mut Lines<'_>, at: Range<usize>, keyword: &str) -> Result<Step, Error> {
     refuse_other_keywords(lines, at, keyword)?;
     let (at, [increments, _, time], every) = lines.step()?;
@@ -293,8 +299,7 @@ fn step(lines: &mut Lines<'_>, at: Range<usize>, keyword: &str) -> Result<Step, 
     };
     if step.increments == 0 {
         return lines.refuse(at, "a step has at least one increment");
-    }
-    if time <= 0.0 {
+    } else if time <= 0.0 {
         return lines.refuse(at, format!("a step takes a time above 0, not {time}"));
     }
     match keyword {

@@ -390,12 +390,11 @@ pub(crate) fn foreign(source: &Source, law: &LawInput) -> Result<Option<Foreign>
     refuse_of_others(source, law, made_for)?;
     refuse_without_worker(source, law, made_for)?;
     let sidecar = law.sidecar.as_ref();
+    let sidecar = sidecar.map(|written| existing("sidecar", written));
     Ok(Some(Foreign {
         adapter: made_for,
         library: existing("library", library)?,
-        sidecar: sidecar
-            .map(|written| existing("sidecar", written))
-            .transpose()?,
+        sidecar: sidecar.transpose()?,
         in_process: law.in_process.value() == Some(true),
         record: law.record.as_ref().map(path),
         records_once: false,

@@ -20,8 +20,8 @@ const MOST_POINTS: usize = 20_000;
 pub(crate) fn read(source: &Source, input: &MeasuredInput) -> Result<Measured, Error> {
     let path = source.file_named(input.file.get_ref(), &input.file.span());
     let at_file = |message: String| Error::from(source.error(input.file.span(), message));
-    let unreadable =
-        |why: String| at_file(format!("`file`: cannot read {}: {why}", path.display()));
+    let shown = path.display();
+    let unreadable = |why: String| at_file(format!("`file`: cannot read {shown}: {why}"));
     let bytes = read_text(&path).map_err(|why| unreadable(why.to_string()))?;
     let (mut reader, columns) = begin(&bytes).map_err(|why| unreadable(why.to_string()))?;
     let table = Table {
@@ -33,34 +33,25 @@ pub(crate) fn read(source: &Source, input: &MeasuredInput) -> Result<Measured, E
     let x = table.position("x", &input.x)?;
     let y = table.position("y", &input.y)?;
     let mut points = Vec::new();
-    let mut row = ByteRecord::new();
-    loop {
-        let is_row = reader.read_byte_record(&mut row);
-        if !is_row.map_err(|why| at_file(format!("`file`: {}: {why}", path.display())))? {
-            break;
-        }
+    for row in reader.byte_records() {
+        let row = row.map_err(|why| at_file(format!("`file`: {shown}: {why}")))?;
         let x = table.number(&row, x, &input.x)?;
         let y = table.number(&row, y, &input.y)?;
         if let (Some(x), Some(y)) = (x, y) {
-            let x = input.x_scale * x + input.x_offset;
-            points.push((x, input.y_scale * y + input.y_offset));
+            let y = input.y_scale * y + input.y_offset;
+            points.push((input.x_scale * x + input.x_offset, y));
         }
         if points.len() > MOST_POINTS {
-            let message = format!(
-                "`file`: {} has more than {MOST_POINTS} points, the most that a figure takes",
-                path.display()
-            );
-            return Err(at_file(message));
+            return Err(at_file(format!(
+                "`file`: {shown} has more than {MOST_POINTS} points, the most that a figure takes"
+            )));
         }
     }
     if points.is_empty() {
-        let message = format!(
-            "`file`: {} has no row with `{}` and `{}`",
-            path.display(),
-            input.x.get_ref(),
-            input.y.get_ref()
-        );
-        return Err(at_file(message));
+        let [x, y] = [&input.x, &input.y].map(Spanned::get_ref);
+        return Err(at_file(format!(
+            "`file`: {shown} has no row with `{x}` and `{y}`"
+        )));
     }
     let is_finite = |(x, y): &&(f64, f64)| x.is_finite() && y.is_finite();
     if let Some((x, y)) = points.iter().find(|point| !is_finite(point)) {

@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::build::line;
-use crate::case::{Case, PileInput};
+use crate::case::{Case, GroupNames, PileInput};
 use mechanics::Simulation;
 use results::pile::{Base, Misfit, Parts, Pile};
 use text::{Source, suggestion};
@@ -36,6 +36,38 @@ fn base(
     }
 }
 
+/// Numbers of the groups that a key of `pile` names: at least one, none twice. The table is at `table`.
+fn numbers(
+    case: &Case,
+    simulation: &Simulation,
+    (names, key): (&GroupNames, &str),
+    table: &Spanned<String>,
+) -> Result<Vec<usize>, Error> {
+    let (source, GroupNames(names)) = (&case.source, names);
+    let known = || simulation.groups().iter().map(|group| group.name.as_str());
+    let number = |name: &Spanned<String>| {
+        let number = known().position(|other| other == name.get_ref());
+        number.ok_or_else(|| {
+            let message = format!("[pile]: there is no group `{}`", name.get_ref());
+            let names: Vec<&str> = known().collect();
+            let error = source.error(name.span(), message);
+            Error::from(error.hint(suggestion(name.get_ref(), names)))
+        })
+    };
+    let numbers = names.iter().map(number).collect::<Result<Vec<_>, _>>()?;
+    for (number, name) in names.iter().enumerate() {
+        if names[..number].contains(name) {
+            let message = format!("[pile]: `{key}` names group `{}` twice", name.get_ref());
+            return Err(source.error(name.span(), message).into());
+        }
+    }
+    if numbers.is_empty() {
+        let message = format!("[pile]: `{key}` is an empty list; it needs a group");
+        return Err(source.error(table.span(), message).into());
+    }
+    Ok(numbers)
+}
+
 /// The pile that a case names, within its mesh.
 ///
 /// # Errors
@@ -44,36 +76,10 @@ pub fn resolve(case: &Case, simulation: &Simulation) -> Result<Option<Pile>, Err
     let Some(input) = &case.file.pile else {
         return Ok(None);
     };
-    let (source, groups) = (&case.source, simulation.groups());
+    let source = &case.source;
     let mesh = &simulation.problem().mesh;
-    let group_names = || groups.iter().map(|group| group.name.as_str());
-    let number = |name: &Spanned<String>| group_names().position(|other| other == name.get_ref());
-    let group = |name: &Spanned<String>| {
-        number(name).ok_or_else(|| {
-            let message = format!("[pile]: there is no group `{}`", name.get_ref());
-            let names: Vec<&str> = group_names().collect();
-            let error = source.error(name.span(), message);
-            Error::from(error.hint(suggestion(name.get_ref(), names)))
-        })
-    };
-    let all = |names: &[Spanned<String>], key: &str| {
-        let numbers = names.iter().map(group);
-        let numbers = numbers.collect::<Result<Vec<usize>, Error>>()?;
-        for (number, name) in names.iter().enumerate() {
-            let mut before = names[..number].iter();
-            if before.any(|other| other.get_ref() == name.get_ref()) {
-                let message = format!("[pile]: `{key}` names group `{}` twice", name.get_ref());
-                return Err(Error::from(source.error(name.span(), message)));
-            }
-        }
-        if numbers.is_empty() {
-            let message = format!("[pile]: `{key}` is an empty list; it needs a group");
-            return Err(Error::from(source.error(input.head.span(), message)));
-        }
-        Ok(numbers)
-    };
-    let of_pile = all(&input.group.0, "group")?;
-    let shaft = all(&input.shaft.0, "shaft")?;
+    let of_pile = numbers(case, simulation, (&input.group, "group"), &input.head)?;
+    let shaft = numbers(case, simulation, (&input.shaft, "shaft"), &input.head)?;
     line(mesh, source, &input.head)?;
     let base = base(source, &input.base, simulation, &shaft)?;
     let diameter = input.diameter.as_ref();

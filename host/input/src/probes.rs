@@ -231,21 +231,16 @@ impl Resolver<'_> {
         quantity: &Spanned<String>,
     ) -> Result<Probe, Error> {
         let of_line = line(self.mesh(), self.source(), of)?;
-        let nodes: Vec<usize> = of_line
-            .nodes
-            .iter()
-            .copied()
+        let nodes = of_line.nodes.iter().copied();
+        let nodes: Vec<usize> = nodes
             .filter(|&n| self.inside(self.mesh().nodes[n]))
             .collect();
         if nodes.is_empty() {
             return Err(self.wrong("no node of the line lies inside the extent"));
         }
-        let Some((what, axis)) = quantity.get_ref().rsplit_once('_') else {
-            return Err(self.unknown_line_quantity(quantity));
-        };
-        let component = match axis {
-            "x" | "r" => 0,
-            "y" | "z" => 1,
+        let (what, component) = match quantity.get_ref().rsplit_once('_') {
+            Some((what, "x" | "r")) => (what, 0),
+            Some((what, "y" | "z")) => (what, 1),
             _ => return Err(self.unknown_line_quantity(quantity)),
         };
         let scale = self.input.scale;
@@ -266,11 +261,8 @@ impl Resolver<'_> {
                 })
             }
             ("reaction", None) | ("force", Some(_)) => {
-                if self
-                    .input
-                    .reduce
-                    .is_some_and(|reduce| reduce != Reduce::Sum)
-                {
+                let reduce = self.input.reduce.unwrap_or(Reduce::Sum);
+                if reduce != Reduce::Sum {
                     return Err(self.wrong("forces are summed"));
                 }
                 let group = group.map(|name| self.group_number(name)).transpose()?;
@@ -343,18 +335,15 @@ impl Resolver<'_> {
         let Some((_, point_quantity)) = known.iter().find(|(id, _)| id == quantity.get_ref())
         else {
             let names: Vec<&str> = known.iter().map(|(id, _)| id.as_str()).collect();
-            let message = format!(
-                "group `{}` has no quantity `{}`",
-                name.get_ref(),
-                quantity.get_ref()
-            );
+            let [name, asked] = [name, quantity].map(Spanned::get_ref);
+            let message = format!("group `{name}` has no quantity `{asked}`");
             let is_dry = !problem.has_pore_pressure();
-            let hint = match Pressure::named(quantity.get_ref()) {
+            let hint = match Pressure::named(asked) {
                 Some(_) if is_dry => {
                     "there is no water in the case: no `[water]`, no `drainage = \"undrained\"`"
                         .into()
                 }
-                _ => suggestion(quantity.get_ref(), names),
+                _ => suggestion(asked, names),
             };
             let error = self.source().error(quantity.span(), message);
             return Err(error.hint(hint).into());
@@ -432,11 +421,9 @@ impl Resolver<'_> {
 /// adds to it.
 pub(crate) fn reactions(case: &Case, problem: &Problem) -> Vec<String> {
     let mesh = &problem.mesh;
-    let middles = |line: &str| -> HashSet<[u64; 2]> {
-        let edges = mesh.lines.get(line).map_or(&[][..], |line| &line.edges);
-        let middle = |&edge: &(usize, usize)| mesh.nodes[mesh.edge(edge)[2]].map(f64::to_bits);
-        edges.iter().map(middle).collect()
-    };
+    let edges = |line: &str| mesh.lines.get(line).map_or(&[][..], |line| &line.edges);
+    // Sides of an interface lie on each other.
+    let middle = |&edge: &(usize, usize)| mesh.nodes[mesh.edge(edge)[2]].map(f64::to_bits);
     let unit = case.file.analysis.force_unit();
     let mut warnings = Vec::new();
     for (name, probe) in &case.file.probes {
@@ -449,23 +436,21 @@ pub(crate) fn reactions(case: &Case, problem: &Problem) -> Vec<String> {
             Some("y" | "z") => 1,
             _ => continue,
         };
-        let read = middles(line.get_ref());
+        let read: HashSet<[u64; 2]> = edges(line.get_ref()).iter().map(middle).collect();
         // The largest share of a pressure, with its phase and line.
         let mut largest: Option<(f64, &str, &str)> = None;
         for phase in &problem.phases {
             for pressure in &phase.pressure {
                 let under = pressure.line.as_str();
-                let edges = mesh.lines.get(under).map_or(&[][..], |line| &line.edges);
-                let shared = edges.iter().copied().filter(|&edge| {
-                    read.contains(&mesh.nodes[mesh.edge(edge)[2]].map(f64::to_bits))
-                });
-                let shared: Vec<(usize, usize)> = shared.collect();
+                let shared = edges(under)
+                    .iter()
+                    .filter(|edge| read.contains(&middle(edge)));
+                let shared: Vec<(usize, usize)> = shared.copied().collect();
                 let force = pressure_on(problem.analysis, mesh, &shared, &pressure.value);
-                let sum = |c: usize| force.iter().skip(c).step_by(2).sum::<f64>();
                 let size: f64 = force.iter().map(|f| f.abs()).sum();
-                let share = sum(component);
+                let share: f64 = force.iter().skip(component).step_by(2).sum();
                 let is_more = largest.is_none_or(|(other, _, _)| share.abs() > other.abs());
-                if sum(component).abs() > NOTHING * size && is_more {
+                if share.abs() > NOTHING * size && is_more {
                     largest = Some((share, &phase.name, under));
                 }
             }
@@ -474,12 +459,11 @@ pub(crate) fn reactions(case: &Case, problem: &Problem) -> Vec<String> {
             let force = quantity.get_ref().replacen("reaction", "force", 1);
             warnings.push(format!(
                 "probe `{}`: `{}` of line `{}` is what its support adds to the pressure on line \
-                 `{under}`: {share:.6e} {unit} of pressure (phase `{}`) are not in it. `{force}` with \
+                 `{under}`: {share:.6e} {unit} of pressure (phase `{phase}`) are not in it. `{force}` with \
                  a `group`, of all groups at the line together, is the whole",
                 name.get_ref(),
                 quantity.get_ref(),
                 line.get_ref(),
-                phase,
             ));
         }
     }

@@ -269,31 +269,22 @@ impl System {
         for (i, tie) in ties.iter().enumerate() {
             tie_of[tie.dof] = Some(i);
         }
-        let elements: Vec<Vec<ElementMap>> = groups
-            .iter()
-            .enumerate()
-            .map(|(number, group)| {
-                let n = if takes_part(number, group) {
-                    group.kinematics.n_elements()
-                } else {
-                    0
-                };
-                (0..n)
-                    .map(|e| ElementMap::new(group.kinematics.nodes(e), &tie_of, ties))
-                    .collect()
-            })
-            .collect();
+        let maps = |(number, group): (usize, &Group)| -> Vec<ElementMap> {
+            let kinematics = &group.kinematics;
+            let map = |element| ElementMap::new(kinematics.nodes(element), &tie_of, ties);
+            let n = usize::from(takes_part(number, group)) * kinematics.n_elements();
+            (0..n).map(map).collect()
+        };
+        let elements: Vec<_> = groups.iter().enumerate().map(maps).collect();
         let numbered = groups.iter().enumerate();
         let taking_part = numbered.filter(|(number, group)| takes_part(*number, group));
         let nodes = taking_part.flat_map(|(_, group)| group.nodes());
         let used = used(nodes, ties, n_dofs);
+        let is_free = |&dof: &usize| used[dof] && !prescribed[dof];
+        let free: Vec<usize> = (0..n_dofs).filter(is_free).collect();
         let mut equation = vec![None; n_dofs];
-        let mut free = Vec::new();
-        for dof in 0..n_dofs {
-            if used[dof] && !prescribed[dof] {
-                equation[dof] = Some(free.len());
-                free.push(dof);
-            }
+        for (number, &dof) in free.iter().enumerate() {
+            equation[dof] = Some(number);
         }
         let is_shared = |dof: &usize| domain.is_some_and(|domain| domain.equation[*dof].is_some());
         let boundary: Vec<usize> = free.iter().copied().filter(is_shared).collect();

@@ -81,6 +81,7 @@ pub mod equilibrium;
 mod error;
 pub mod ground;
 pub mod group;
+mod joined;
 pub mod mesh;
 pub mod model;
 mod numbers;

@@ -31,7 +31,7 @@ pub struct Model {
     /// Mid-thickness nodes that follow the two faces of a thin layer.
     pub ties: Vec<Tie>,
     /// For every phase but the first, the groups that take another law.
-    pub swaps: Vec<Vec<(usize, Material)>>,
+    pub swaps: Swaps,
     /// Warnings about implausible input.
     pub warnings: Vec<String>,
 }
@@ -66,6 +66,34 @@ pub fn hypothesis(
     }
 }
 
+/// Groups that take other laws, by phase.
+type Swaps = Vec<Vec<(usize, Material)>>;
+
+/// The laws that groups start with and those that later phases swap them for. A phase's laws hold from it on; the
+/// first phase's replace those of the groups at once.
+fn materials(problem: &Problem) -> Result<(Vec<Material>, Swaps), Refusal> {
+    let mut swaps = vec![Vec::new(); problem.phases.len()];
+    let mut first = Vec::new();
+    for (number, group) in problem.groups.iter().enumerate() {
+        let mut own = None;
+        for (phase, input) in problem.phases.iter().enumerate() {
+            let swap = input.materials.iter().find(|(of, _)| *of == number);
+            let Some((_, material)) = swap else { continue };
+            check_law(problem, number, group, material, Some(phase))?;
+            if phase == 0 {
+                own = Some(material.clone());
+            } else {
+                swaps[phase].push((number, material.clone()));
+            }
+        }
+        if own.is_none() {
+            check_law(problem, number, group, &group.material, None)?;
+        }
+        first.push(own.unwrap_or_else(|| group.material.clone()));
+    }
+    Ok((first, swaps))
+}
+
 impl Model {
     /// Builds a model and checks everything that can be checked before the first increment.
     ///
@@ -73,26 +101,7 @@ impl Model {
     /// The part of the problem that does not fit, or the point whose law cannot start.
     pub fn build(problem: &Problem) -> Result<Self, BuildError> {
         check::problem(problem)?;
-        // A phase's laws hold from it on; the first phase's replace those of the groups at once.
-        let mut swaps = vec![Vec::new(); problem.phases.len()];
-        let mut first = Vec::new();
-        for (number, group) in problem.groups.iter().enumerate() {
-            let mut own = None;
-            for (phase, input) in problem.phases.iter().enumerate() {
-                let swap = input.materials.iter().find(|(of, _)| *of == number);
-                let Some((_, material)) = swap else { continue };
-                check_law(problem, number, group, material, Some(phase))?;
-                if phase == 0 {
-                    own = Some(material.clone());
-                } else {
-                    swaps[phase].push((number, material.clone()));
-                }
-            }
-            if own.is_none() {
-                check_law(problem, number, group, &group.material, None)?;
-            }
-            first.push(own.unwrap_or_else(|| group.material.clone()));
-        }
+        let (first, swaps) = materials(problem)?;
         let surroundings = Surroundings::new(problem);
         let initial = InitialStresses::of(problem);
         let mut groups = Vec::new();

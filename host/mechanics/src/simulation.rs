@@ -185,21 +185,27 @@ impl Simulation {
             has_failed: false,
             problem,
         };
-        simulation.beyond.knows(&simulation.groups);
-        for (group, input) in simulation.groups.iter_mut().zip(&simulation.problem.groups) {
+        simulation.begin()?;
+        Ok(simulation)
+    }
+
+    /// What is there and held before the first phase.
+    fn begin(&mut self) -> Result<(), Error> {
+        self.beyond.knows(&self.groups);
+        for (group, input) in self.groups.iter_mut().zip(&self.problem.groups) {
             if !input.is_active {
                 group.disappear();
             }
         }
-        simulation.force = simulation.loading[1].forces(&simulation.problem, &simulation.groups);
-        for support in &simulation.problem.supports {
-            for dof in simulation.dofs(&support.line, &support.fixed) {
-                simulation.prescribed.insert(dof, 0.0);
+        self.force = self.loading[1].forces(&self.problem, &self.groups);
+        for support in &self.problem.supports {
+            for dof in self.dofs(&support.line, &support.fixed) {
+                self.prescribed.insert(dof, 0.0);
             }
         }
-        simulation.check_alike()?;
-        simulation.sometimes_held = simulation.held_in_some_phases();
-        Ok(simulation)
+        self.check_alike()?;
+        self.sometimes_held = self.held_in_some_phases();
+        Ok(())
     }
 
     /// Its factors, for other simulations.
@@ -389,6 +395,27 @@ impl Simulation {
         Ok(())
     }
 
+    /// When laws are called in an increment of a phase.
+    fn moment(&self, phase: usize, increment: usize) -> Moment {
+        Moment {
+            step: phase as u32 + 1,
+            increment: increment as u32,
+            step_start: self.time,
+            step_length: self.problem.phases[phase].length(),
+            is_undrained: false,
+        }
+    }
+
+    /// Leaves an increment that ended in an error.
+    fn leave(&mut self, error: &Error, place: &Place, phase: &mut UnderWay, watch: &mut dyn Watch) {
+        let _ = process_state::restore();
+        if matches!(error, Error::NoEquilibrium(_)) {
+            self.tell_torn(place, false, watch);
+        }
+        // What led here matters more than trouble with the state before it.
+        self.hand_out_last(place, phase, watch);
+    }
+
     /// The next increment of a phase; `None` if the phase turns out to have none.
     fn increment(
         &mut self,
@@ -402,24 +429,18 @@ impl Simulation {
             phase: input.name.clone(),
             increment,
         };
+        let moment = self.moment(phase.number, increment);
         for group in &mut self.groups {
+            let is_undrained = group.is_undrained();
             group.moment = Moment {
-                step: phase.number as u32 + 1,
-                increment: increment as u32,
-                step_start: self.time,
-                step_length: input.length(),
-                is_undrained: group.is_undrained(),
+                is_undrained,
+                ..moment
             };
         }
         let done = match self.reach(&place, n, phase, watch) {
             Ok(done) => done,
             Err(error) => {
-                let _ = process_state::restore();
-                if matches!(error, Error::NoEquilibrium(_)) {
-                    self.tell_torn(&place, false, watch);
-                }
-                // What led here matters more than trouble with the state before it.
-                self.hand_out_last(&place, phase, watch);
+                self.leave(&error, &place, phase, watch);
                 return Err(error);
             }
         };

@@ -214,56 +214,31 @@ mod tests {
         let new = |hypothesis| Segment::new(hypothesis, 1, 1);
         let led = |hypothesis, component, control| new(hypothesis).lead(component, control);
         assert_eq!(refused(&[], solid), (None, Misuse::NoSegment));
+        let [mut roscoe, mut at_once, mut unrestricted] = [plane, solid, solid].map(new);
+        roscoe.frame = Frame::Roscoe;
+        at_once.time = Some(0.0);
+        unrestricted.restrictions = Some(Restrictions::default());
         let cases = [
             (joint, Segment::new(joint, 1, 0), Misuse::Increments(0)),
             (joint, Segment::new(joint, 1, MAX_INCREMENTS), {
                 Misuse::Increments(MAX_INCREMENTS)
             }),
-            (
-                joint,
-                led(joint, 0, Control::Stiffness(-2.5)),
-                Misuse::NegativeStiffness(-2.5),
-            ),
-            (
-                solid,
-                led(solid, 0, Control::Stiffness(1.0)),
-                Misuse::StiffnessOfSolid,
-            ),
-            (
-                solid,
-                led(solid, 5, Control::FluxBy(f64::INFINITY)),
-                Misuse::NotFinite(f64::INFINITY),
-            ),
-            (
-                plane,
-                led(plane, 2, Control::Gradient(1e-9)),
-                Misuse::OutOfPlane,
-            ),
+            (joint, led(joint, 0, Control::Stiffness(-2.5)), {
+                Misuse::NegativeStiffness(-2.5)
+            }),
+            (solid, led(solid, 0, Control::Stiffness(1.0)), {
+                Misuse::StiffnessOfSolid
+            }),
+            (solid, led(solid, 5, Control::FluxBy(f64::INFINITY)), {
+                Misuse::NotFinite(f64::INFINITY)
+            }),
+            (plane, led(plane, 2, Control::Gradient(1e-9)), {
+                Misuse::OutOfPlane
+            }),
             (plane, led(plane, 2, Control::Keep), Misuse::OutOfPlane),
-            (
-                plane,
-                Segment {
-                    frame: Frame::Roscoe,
-                    ..new(plane)
-                },
-                Misuse::ThreeDimensional,
-            ),
-            (
-                solid,
-                Segment {
-                    time: Some(0.0),
-                    ..new(solid)
-                },
-                Misuse::Time(0.0),
-            ),
-            (
-                solid,
-                Segment {
-                    restrictions: Some(Restrictions::default()),
-                    ..new(solid)
-                },
-                Misuse::NoRestriction(1),
-            ),
+            (plane, roscoe, Misuse::ThreeDimensional),
+            (solid, at_once, Misuse::Time(0.0)),
+            (solid, unrestricted, Misuse::NoRestriction(1)),
         ];
         for (hypothesis, segment, misuse) in cases {
             let found = refused(&[new(hypothesis), segment], hypothesis);

@@ -2,7 +2,7 @@
 
 use crate::pile::{self, Pile};
 use crate::probe::Probes;
-use mechanics::simulation::Snapshot;
+use mechanics::simulation::{Part, Simulation, Snapshot};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -28,6 +28,15 @@ impl OutputRequest {
     pub fn columns(&self) -> impl Iterator<Item = &str> {
         let of_pile = self.pile.iter().flat_map(|_| pile::COLUMNS);
         self.probes.names().chain(of_pile)
+    }
+
+    /// What the numbers of every increment look at.
+    pub(crate) fn looks_at(&self, simulation: &Simulation) -> Part {
+        let mut part = self.probes.looks_at(simulation);
+        if let Some(pile) = &self.pile {
+            pile.looks_at(&mut part, simulation);
+        }
+        part
     }
 
     /// The value of one of them in a state that nobody records; `None` where it has none.

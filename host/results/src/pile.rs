@@ -327,24 +327,25 @@ impl Pile {
         &self.parts.shaft
     }
 
+    /// The outer forces on those of its groups that are there, divided, and the weights of these.
+    fn split(&self, snapshot: &Snapshot<'_>, there: &[usize]) -> (Split<'_>, Vec<(usize, f64)>) {
+        let n_dofs = 2 * snapshot.problem.mesh.nodes.len();
+        let (outer, weights) = external(snapshot, there, n_dofs);
+        let mut held = Self::held(snapshot, &self.geometry.shaft, n_dofs);
+        self.take_from_ground(snapshot, &mut held, n_dofs);
+        let outer = |node: usize| outer[2 * node + 1];
+        (Split::new(&self.geometry, &held, outer), weights)
+    }
+
     /// The pile in a state, without net forces; `None` if it is absent.
     pub fn state(&self, snapshot: &Snapshot<'_>) -> Option<State> {
-        let Snapshot {
-            groups, problem, ..
-        } = snapshot;
         let mut there = self.parts.groups.clone();
-        there.retain(|&group| groups[group].is_active);
+        there.retain(|&group| snapshot.groups[group].is_active);
         if there.is_empty() {
             return None;
         }
-        let n_dofs = 2 * problem.mesh.nodes.len();
-        let (outer, weights) = external(snapshot, &there, n_dofs);
-        let outer = |node: usize| outer[2 * node + 1];
         let geometry = &self.geometry;
-        let mut held = Self::held(snapshot, &geometry.shaft, n_dofs);
-        self.take_from_ground(snapshot, &mut held, n_dofs);
-        let split = Split::new(geometry, &held, outer);
-        let weight: f64 = weights.iter().map(|(_, weight)| weight).sum();
+        let (split, weights) = self.split(snapshot, &there);
         let y = |node: &usize| snapshot.displacement[2 * node + 1];
         let settlement =
             |nodes: &[usize]| -nodes.iter().map(y).sum::<f64>() / nodes.len().max(1) as f64;
@@ -353,24 +354,23 @@ impl Pile {
             shaft: split.shaft,
             base: split.base,
             settlement: settlement(&geometry.rows[0].nodes),
-            weight,
+            weight: weights.iter().map(|(_, weight)| weight).sum(),
         };
         let along = friction::along(snapshot, geometry, &split);
         let last = geometry.rows.len() - 1;
         let station = |(number, row): (usize, &Row)| {
-            let z = row.z;
             let axial_force = match number {
                 0 => loads.head,
                 _ if number == last => loads.base,
                 _ => {
-                    let above = split.above(z, snapshot) + self.bend(row, &along);
-                    loads.head + self.weight_above(snapshot, &weights, z) - above
+                    let above = split.above(row.z, snapshot) + self.bend(row, &along);
+                    loads.head + self.weight_above(snapshot, &weights, row.z) - above
                 }
             };
             let mut parts = row.at.iter();
             let held = parts.find_map(|&(span, part)| along[span].map(|held| held[part]));
             Station {
-                z,
+                z: row.z,
                 axial_force,
                 shaft_friction: held.map(|held| held[0]),
                 normal_stress: held.map(|held| held[1]),

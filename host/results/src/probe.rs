@@ -207,15 +207,8 @@ impl Probe {
                 elements,
                 scale,
             } => {
-                let sum = |nodes: &[usize], forces: &[f64]| -> f64 {
-                    nodes.iter().map(|&n| forces[2 * n + component]).sum()
-                };
-                let Some(number) = *group else {
-                    let nodes = tied_nodes(snapshot.groups, nodes);
-                    return Some(scale * sum(&nodes, snapshot.reaction));
-                };
-                let forces = forces_of_others(snapshot, number, elements.as_deref())?;
-                Some(scale * sum(nodes, &forces))
+                let of = (*group, elements.as_deref());
+                Some(scale * force(snapshot, (nodes, *component), of)?)
             }
             Self::HandedOn {
                 group,
@@ -232,6 +225,23 @@ impl Probe {
                 .sum(),
         }
     }
+}
+
+/// A component of the force on nodes: the reaction, or what others exert on elements of a group.
+fn force(
+    snapshot: &Snapshot<'_>,
+    (nodes, component): (&[usize], usize),
+    (group, elements): (Option<usize>, Option<&[usize]>),
+) -> Option<f64> {
+    let sum = |nodes: &[usize], forces: &[f64]| -> f64 {
+        nodes.iter().map(|&n| forces[2 * n + component]).sum()
+    };
+    let Some(group) = group else {
+        let nodes = tied_nodes(snapshot.groups, nodes);
+        return Some(sum(&nodes, snapshot.reaction));
+    };
+    let forces = forces_of_others(snapshot, group, elements)?;
+    Some(sum(nodes, &forces))
 }
 
 /// What others exert on a group, or on some of its elements, by degree of freedom.

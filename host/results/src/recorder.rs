@@ -98,6 +98,24 @@ fn empty_figures(wanted: &OutputRequest) -> Figures {
     Figures::new(&wanted.title, &wanted.figures, names)
 }
 
+/// The tables of increments and, where the path of equilibrium is followed, of steps along it.
+fn tables_of_increments(
+    folder: &Path,
+    wanted: &OutputRequest,
+    at: Option<&ResultsState>,
+) -> Result<(Table, Option<Table>), Error> {
+    let columns = |time| {
+        let place = ["phase", "increment", time].into_iter();
+        place.chain(wanted.columns()).chain(["iterations"])
+    };
+    let from = at.and_then(|state| state.path);
+    let path = || Table::begin(folder.join("path.csv"), columns("load_factor"), from);
+    let path = wanted.follows_path.then(path).transpose()?;
+    let from = at.map(|state| state.history);
+    let history = Table::begin(folder.join("history.csv"), columns("time"), from)?;
+    Ok((history, path))
+}
+
 /// Ids of the internal variables of all laws that these groups ever carry, each once.
 pub(crate) fn internal_variables(
     simulation: &Simulation,
@@ -181,30 +199,18 @@ impl Recorder {
     ) -> Result<Self, Error> {
         wanted.probes.narrow(simulation);
         let settings = wanted.output;
-        let columns = |time| {
-            let place = ["phase", "increment", time].into_iter();
-            place.chain(wanted.columns()).chain(["iterations"])
-        };
         let at = state.as_ref();
-        let from = at.and_then(|state| state.path);
-        let path = || Table::begin(folder.join("path.csv"), columns("load_factor"), from);
-        let path = wanted.follows_path.then(path).transpose()?;
-        let from = at.map(|state| state.history);
-        let history = Table::begin(folder.join("history.csv"), columns("time"), from)?;
+        let (history, path) = tables_of_increments(folder, &wanted, at)?;
         let from = at.and_then(|state| state.profile);
         let profile = Profile::begin(folder, settings.profile, simulation, from)?;
         let from = at.and_then(|state| state.points);
         let points = Points::begin(folder, settings.points, simulation, from)?;
-        let mut looked_at = wanted.probes.looks_at(simulation);
-        if let Some(pile) = &wanted.pile {
-            pile.looks_at(&mut looked_at, simulation);
-        }
+        let looked_at = wanted.looks_at(simulation);
         let summary = Progress::new(about, &wanted, simulation);
         let figures = empty_figures(&wanted);
         let from = at.and_then(|state| state.pile.as_ref());
-        let pile = wanted
-            .pile
-            .map(|pile| PileRecord::begin(pile, folder, simulation, from));
+        let pile = wanted.pile;
+        let pile = pile.map(|pile| PileRecord::begin(pile, folder, simulation, from));
         let mut results = Self {
             history,
             path,
@@ -422,15 +428,12 @@ impl Recorder {
         increment: &Increment,
         snapshot: &Snapshot<'_>,
     ) -> Result<(), Fault> {
-        let Increment {
-            place, of, time, ..
-        } = increment;
+        let (place, of, time) = (&increment.place, &increment.of, increment.time);
         self.begins(&place.phase, snapshot);
         let (probes, pile) = self.values(place, snapshot)?;
         let start = Instant::now();
-        let iterations = increment.iterations;
-        self.history
-            .row(history_row(place, *time, &probes, iterations));
+        let row = history_row(place, time, &probes, increment.iterations);
+        self.history.row(row);
         self.history.flush()?;
         if self.settings.profile.includes(place.increment, *of)
             && let Some(profile) = &mut self.profile
@@ -451,7 +454,7 @@ impl Recorder {
         if self.settings.fields.includes(place.increment, *of)
             && let Some(fields) = &mut self.fields
         {
-            fields.write(*time, snapshot)?;
+            fields.write(time, snapshot)?;
         }
         if place.increment == *of {
             self.note_sizes(snapshot);

@@ -32,11 +32,26 @@ use budget::Budget;
 use mechanics::Simulation;
 use page::For;
 use results::Run;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// Name of a report's file.
 const FILE: &str = "report.html";
+
+fn internal(why: impl Display) -> Error {
+    Error::Internal(format!("report: {why}"))
+}
+
+/// A page from its template.
+fn filled(template: &str, page: minijinja::Value) -> Result<String, Error> {
+    let mut environment = minijinja::Environment::new();
+    environment
+        .add_template(FILE, template)
+        .and_then(|()| environment.get_template(FILE))
+        .and_then(|template| template.render(page))
+        .map_err(|error| internal(format!("{error:#}")))
+}
 
 /// Default place of the report of these folders: into the folder
 /// itself, or next to the first of several.

@@ -84,18 +84,10 @@ pub fn read<T: DeserializeOwned>(source: Source) -> Result<(Source, Variants<T>)
     Ok((source, files))
 }
 
-/// Reads a file that stands behind those that it is based on.
-///
-/// # Errors
-/// [`Error::Input`] at the place that does not fit.
-pub fn merged<T: DeserializeOwned>(source: &Source) -> Result<Variants<T>, Error> {
-    // Blank lines instead of the files before each one keep spans counting from the start.
-    let texts: Vec<String> = source
-        .files()
-        .map(|range| "\n".repeat(range.start) + &source.text()[range])
-        .collect();
+/// The tables of files as one, later ones over earlier ones.
+fn together<'t>(source: &Source, files: &'t [String]) -> Result<Spanned<DeTable<'t>>, Error> {
     let mut merged: Option<Spanned<DeTable<'_>>> = None;
-    for text in &texts {
+    for text in files {
         let mut table = parse_table(source, text)?;
         table.get_mut().remove("base");
         match &mut merged {
@@ -103,6 +95,42 @@ pub fn merged<T: DeserializeOwned>(source: &Source) -> Result<Variants<T>, Error
             Some(merged) => merge(merged.get_mut(), table.into_inner()),
         }
     }
+    merged.ok_or_else(|| Error::Internal("a source without files".to_owned()))
+}
+
+/// The name of a variant, and what it changes.
+fn named_variant<'t>(
+    source: &Source,
+    variant: Spanned<DeValue<'t>>,
+) -> Result<(String, DeTable<'t>), Error> {
+    let (span, given) = (variant.span(), name(&variant));
+    let (Some(name), DeValue::Table(mut over)) = (given, variant.into_inner()) else {
+        return Err(source.error(span, "a [[variant]] needs a `name`").into());
+    };
+    let plain = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
+    if !name.starts_with(|c: char| c.is_ascii_alphanumeric()) || !name.chars().all(plain) {
+        let message = format!("`{name}` cannot be a folder's name: letters, digits, _ - .");
+        return Err(source.error(span, message).into());
+    }
+    over.remove("name");
+    if let Some((key, _)) = over.iter().find(|(key, _)| key.get_ref() == "base") {
+        let message = "a variant has no `base`: it differs from the file that it stands in";
+        let error = source.error(key.span(), message);
+        let error = error.hint("the `base` stands at the top of the file");
+        return Err(error.into());
+    }
+    Ok((name, over))
+}
+
+/// Reads a file that stands behind those that it is based on.
+///
+/// # Errors
+/// [`Error::Input`] at the place that does not fit.
+pub fn merged<T: DeserializeOwned>(source: &Source) -> Result<Variants<T>, Error> {
+    // Blank lines instead of the files before each one keep spans counting from the start.
+    let files = source.files();
+    let files = files.map(|range| "\n".repeat(range.start) + &source.text()[range]);
+    let files: Vec<String> = files.collect();
     let texts = source.settings().map(|range| {
         let text = " ".repeat(range.start) + &source.text()[range.clone()];
         (range, text)
@@ -112,18 +140,15 @@ pub fn merged<T: DeserializeOwned>(source: &Source) -> Result<Variants<T>, Error
         .iter()
         .map(|(range, text)| Setting::read(source, range.clone(), text))
         .collect::<Result<Vec<_>, _>>()?;
-    let mut merged = merged.ok_or_else(|| Error::Internal("a source without files".to_owned()))?;
+    let mut merged = together(source, &files)?;
     let Some(variants) = merged.get_mut().remove("variant") else {
-        return Ok(vec![(
-            None,
-            with_settings(source, merged, &settings, None)?,
-        )]);
+        let file = with_settings(source, merged, &settings, None)?;
+        return Ok(vec![(None, file)]);
     };
     let span = variants.span();
     let DeValue::Array(variants) = variants.into_inner() else {
-        return Err(source
-            .error(span, "variants are written as [[variant]]")
-            .into());
+        let error = source.error(span, "variants are written as [[variant]]");
+        return Err(error.into());
     };
     if variants.len().saturating_mul(source.text().len()) > MOST_TOGETHER {
         let message = format!(
@@ -136,26 +161,11 @@ pub fn merged<T: DeserializeOwned>(source: &Source) -> Result<Variants<T>, Error
     }
     let mut files: Variants<T> = Vec::new();
     for variant in variants {
-        let (span, given) = (variant.span(), name(&variant));
-        let (Some(name), DeValue::Table(mut over)) = (given, variant.into_inner()) else {
-            return Err(source.error(span, "a [[variant]] needs a `name`").into());
-        };
-        let plain = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
-        if !name.starts_with(|c: char| c.is_ascii_alphanumeric()) || !name.chars().all(plain) {
-            let message = format!("`{name}` cannot be a folder's name: letters, digits, _ - .");
-            return Err(source.error(span, message).into());
-        }
+        let span = variant.span();
+        let (name, over) = named_variant(source, variant)?;
         if files.iter().any(|(other, _)| other.as_ref() == Some(&name)) {
             let message = format!("two variants are called `{name}`");
             return Err(source.error(span, message).into());
-        }
-        over.remove("name");
-        if let Some((key, _)) = over.iter().find(|(key, _)| key.get_ref() == "base") {
-            let message = "a variant has no `base`: it differs from the file that it stands in";
-            let error = source.error(key.span(), message);
-            return Err(error
-                .hint("the `base` stands at the top of the file")
-                .into());
         }
         let own: Vec<Range<usize>> = over.keys().map(Spanned::span).collect();
         let mut table = merged.clone();

@@ -144,18 +144,12 @@ impl CoulombJoint {
     /// The part of the increment in contact, or the gap at its end if absent.
     #[inline]
     fn contact(&self, point: &InterfacePoint<State>) -> Result<Contact, f64> {
-        let gap = point.state.gap;
-        if gap > 0.0 {
-            return Ok(Contact {
-                traction: [0.0; 2],
-                part: InContact::after_closure(gap, point.jump_increment)?,
-                strength: self.broken,
-            });
-        }
+        let State { gap, broken, .. } = point.state;
+        let (traction, part) = InContact::from(gap, point.traction, point.jump_increment)?;
         Ok(Contact {
-            traction: point.traction,
-            part: InContact::throughout(point.jump_increment),
-            strength: if point.state.broken > 0.5 {
+            traction,
+            part,
+            strength: if gap > 0.0 || broken > 0.5 {
                 self.broken
             } else {
                 self.intact

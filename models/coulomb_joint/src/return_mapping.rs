@@ -47,7 +47,7 @@ impl CoulombJoint {
         let round_off = 4.0 * f64::EPSILON * (cohesion + (normal * tan_phi).abs());
         if excess <= round_off && normal <= tensile {
             let tangent = [[k_n, 0.0], [0.0, k_t]];
-            return response([normal, shear], closed, tangent, contact);
+            return contact.part.response([normal, shear], closed, tangent);
         }
         // Eq. (4).
         let resistance = k_t + k_n * tan_phi * tan_psi;
@@ -71,7 +71,7 @@ impl CoulombJoint {
             ],
         ];
         let end = slid(closed, d_lambda, tan_psi);
-        response(traction, end, tangent, contact)
+        contact.part.response(traction, end, tangent)
     }
 
     /// The state after the joint has opened: the flow until then counts, Eq. (6).
@@ -135,26 +135,6 @@ impl CoulombJoint {
         } else {
             0.0
         }
-    }
-}
-
-/// Tangent by the jump from the tangent by what acts on the joint in contact.
-#[inline]
-fn response(
-    traction: [f64; 2],
-    state: State,
-    [[a, b], [c, d]]: [[f64; 2]; 2],
-    contact: &Contact,
-) -> InterfaceResponse<State> {
-    let [by_normal, by_tangential] = contact.part.slip_by_jump;
-    InterfaceResponse {
-        traction,
-        state,
-        tangent: [
-            [a + b * by_normal, b * by_tangential],
-            [c + d * by_normal, d * by_tangential],
-        ],
-        unreliable: None,
     }
 }
 

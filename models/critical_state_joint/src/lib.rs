@@ -176,13 +176,9 @@ impl CriticalStateJoint {
             jump_increment,
             ..
         } = *point;
-        let ([normal, shear], part) = if state.gap <= 0.0 {
-            (traction, InContact::throughout(jump_increment))
-        } else {
-            match InContact::after_closure(state.gap, jump_increment) {
-                Ok(part) => ([0.0; 2], part),
-                Err(gap) => return Ok(InterfaceResponse::open(State { gap, ..state })),
-            }
+        let ([normal, shear], part) = match InContact::from(state.gap, traction, jump_increment) {
+            Ok(contact) => contact,
+            Err(gap) => return Ok(InterfaceResponse::open(State { gap, ..state })),
         };
         let p = &self.parameters;
         let contact = Contact {
@@ -223,7 +219,7 @@ impl CriticalStateJoint {
                 ..state
             };
             let tangent = [[p.normal_stiffness, 0.0], [0.0, p.shear_stiffness]];
-            return Ok(response([-sigma_trial, tau_trial], state, tangent, &part));
+            return Ok(part.response([-sigma_trial, tau_trial], state, tangent));
         }
         let sign = 1.0_f64.copysign(excess);
         let flow = Flow {
@@ -256,7 +252,7 @@ impl CriticalStateJoint {
         let [[a, b], [c, d]] = flow.tangent(end)?;
         let tangent = [[a, sign * b], [sign * c, d]];
         let traction = [-end.sigma, sign * end.mu * end.sigma];
-        Ok(response(traction, state, tangent, part))
+        Ok(part.response(traction, state, tangent))
     }
 
     /// The faces part, or touch without stress: Eq. (9).
@@ -280,26 +276,6 @@ impl CriticalStateJoint {
     fn void_ratio(&self, state: &State, opening: f64) -> f64 {
         let growth = (opening / self.parameters.thickness).exp_m1();
         state.void_ratio + (1.0 + state.void_ratio) * growth
-    }
-}
-
-/// Tangent by the jump from the tangent by what acts on the joint in contact.
-#[inline]
-fn response(
-    traction: [f64; 2],
-    state: State,
-    [[a, b], [c, d]]: [[f64; 2]; 2],
-    part: &InContact,
-) -> InterfaceResponse<State> {
-    let [by_normal, by_tangential] = part.slip_by_jump;
-    InterfaceResponse {
-        traction,
-        state,
-        tangent: [
-            [a + b * by_normal, b * by_tangential],
-            [c + d * by_normal, d * by_tangential],
-        ],
-        unreliable: None,
     }
 }
 

@@ -144,16 +144,9 @@ impl CyclicJoint {
             jump_increment,
             ..
         } = *point;
-        if state.gap <= 0.0 {
-            return self.carry(&Contact {
+        match InContact::from(state.gap, traction, jump_increment) {
+            Ok((traction, part)) => self.carry(&Contact {
                 traction,
-                part: InContact::throughout(jump_increment),
-                state,
-            });
-        }
-        match InContact::after_closure(state.gap, jump_increment) {
-            Ok(part) => self.carry(&Contact {
-                traction: [0.0; 2],
                 part,
                 state,
             }),

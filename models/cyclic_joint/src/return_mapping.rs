@@ -68,7 +68,7 @@ impl CyclicJoint {
         if trial.tau.abs() <= start.friction * trial.sigma * (1.0 + 4.0 * f64::EPSILON) {
             let closed = State { gap: 0.0, ..state };
             let tangent = [[k_n, 0.0], [0.0, k_t]];
-            return Ok(response([-trial.sigma, trial.tau], closed, tangent, &part));
+            return Ok(part.response([-trial.sigma, trial.tau], closed, tangent));
         }
         let Some(d_xi) = self.slip_to_surface(&trial, state.plastic_slip)? else {
             return Ok(self.open(contact, &trial));
@@ -84,7 +84,7 @@ impl CyclicJoint {
         };
         // On the surface to the last bit.
         let traction = [-sigma, sign * end.friction * sigma];
-        Ok(response(traction, state, tangent, &part))
+        Ok(part.response(traction, state, tangent))
     }
 
     /// Eq. (7) on the surface.
@@ -225,24 +225,4 @@ const NO_TANGENT: Failure = Failure::CutStep {
 fn resistance(law: &CyclicJoint, at: &Faded, sigma: f64) -> f64 {
     law.shear_stiffness + at.friction_slope * sigma
         - at.friction * law.normal_stiffness * at.contraction_rate
-}
-
-/// Tangent by the jump from the tangent by what acts on the joint in contact.
-#[inline]
-fn response(
-    traction: [f64; 2],
-    state: State,
-    [[a, b], [c, d]]: [[f64; 2]; 2],
-    part: &InContact,
-) -> InterfaceResponse<State> {
-    let [by_normal, by_tangential] = part.slip_by_jump;
-    InterfaceResponse {
-        traction,
-        state,
-        tangent: [
-            [a + b * by_normal, b * by_tangential],
-            [c + d * by_normal, d * by_tangential],
-        ],
-        unreliable: None,
-    }
 }

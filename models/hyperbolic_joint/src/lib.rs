@@ -174,13 +174,10 @@ impl HyperbolicJoint {
     #[inline]
     fn carry(&self, point: &InterfacePoint<State>) -> InterfaceResponse<State> {
         let State { gap, broken, .. } = point.state;
-        let (traction, part) = if gap > 0.0 {
-            match InContact::after_closure(gap, point.jump_increment) {
-                Ok(part) => ([0.0; 2], part),
-                Err(gap) => return InterfaceResponse::open(State { gap, ..point.state }),
-            }
-        } else {
-            (point.traction, InContact::throughout(point.jump_increment))
+        let contact = InContact::from(gap, point.traction, point.jump_increment);
+        let (traction, part) = match contact {
+            Ok(contact) => contact,
+            Err(gap) => return InterfaceResponse::open(State { gap, ..point.state }),
         };
         // Eq. (1).
         let sigma = -(traction[0] + self.normal_stiffness * part.opening);
@@ -196,25 +193,15 @@ impl HyperbolicJoint {
                 broken: 1.0,
             });
         }
-        let [by_normal, by_tangential] = part.slip_by_jump;
+        let state = State {
+            stress_level: end.stress_level,
+            gap: 0.0,
+            broken,
+        };
+        // σ_n = −t_n falls by K_n with the opening.
         let by_sigma = -self.normal_stiffness * end.by_sigma;
-        InterfaceResponse {
-            traction: [-sigma, end.tau],
-            state: State {
-                stress_level: end.stress_level,
-                gap: 0.0,
-                broken,
-            },
-            // σ_n = −t_n falls by K_n with the opening.
-            tangent: [
-                [self.normal_stiffness, 0.0],
-                [
-                    by_sigma + end.by_slip * by_normal,
-                    end.by_slip * by_tangential,
-                ],
-            ],
-            unreliable: None,
-        }
+        let tangent = [[self.normal_stiffness, 0.0], [by_sigma, end.by_slip]];
+        part.response([-sigma, end.tau], state, tangent)
     }
 
     /// Stiffness and strength at a normal stress, compression positive.

@@ -90,14 +90,10 @@ impl QzCurve {
         let State { stiff_part, gap } = point.state;
         // A tension is there at the start only: faces that stand apart by as much.
         let gap = gap.max(point.traction[0] / self.curve.slope);
-        let (traction, part) = if gap > 0.0 {
-            match InContact::after_closure(gap, point.jump_increment) {
-                Ok(part) => ([0.0; 2], part),
-                Err(gap) => return InterfaceResponse::open(State { stiff_part, gap }),
-            }
-        } else {
-            let part = InContact::throughout(point.jump_increment);
-            (point.traction, part)
+        let contact = InContact::from(gap, point.traction, point.jump_increment);
+        let (traction, part) = match contact {
+            Ok(contact) => contact,
+            Err(gap) => return InterfaceResponse::open(State { stiff_part, gap }),
         };
         let start = Mobilised {
             stress: -traction[0],

@@ -5,7 +5,7 @@ use crate::Error;
 use crate::case::LawInput;
 use crate::expression::{Expression, Reference};
 use crate::ground::ProfileInput;
-use crate::material::{ParameterTable, ParameterValue, given, internal_variable, place_failure};
+use crate::material::{ParameterTable, ParameterValue, given, place_failure};
 use abi::Hypothesis;
 use law::{BuiltLaw, LoadedLaw, Operator, ParameterDescription};
 use mechanics::ground::InitialStresses;
@@ -14,6 +14,7 @@ use mechanics::problem::{Formulation, Variation};
 use std::ops::Range;
 use std::sync::Arc;
 use text::suggestion;
+use toml::Spanned;
 
 /// Parameters as a law is built with them, and the values of elements where these differ.
 type OfGroup = (ParameterTable, Vec<(String, Variation)>);
@@ -176,33 +177,7 @@ impl LawShelf<'_> {
             let message = || format!("`{name}` has no value: it is left out and has no default");
             return default.ok_or_else(|| wrong(&asked.by, message()).into());
         };
-        let at = written.span();
-        let value = match written.get_ref() {
-            ParameterValue::Number(number) => *number,
-            ParameterValue::Integer(number) => *number as f64,
-            ParameterValue::Varying(over) => {
-                let profile = ProfileInput::Over(over.clone()).read(self.source, at.clone())?;
-                let ([_, height], _) = asked.place.ok_or(Without::Place)?;
-                profile.at(*height)
-            }
-            ParameterValue::Label(label) => {
-                let Some(text) = Expression::text(label) else {
-                    let message = format!("`{name}` is \"{label}\", no number");
-                    return Err(wrong(&asked.by, message).into());
-                };
-                let expression = Expression::parse(text)
-                    .map_err(|why| wrong(&at, format!("`{name}`: {why}")))?;
-                let mut asked = asked.clone();
-                asked.chain.push(own);
-                asked.by.clone_from(&at);
-                let value = expression.value(&mut |reference| self.referred(reference, &asked))?;
-                if !value.is_finite() {
-                    let message = format!("`{name}`: the expression gives {value}, no number");
-                    return Err(wrong(&at, message).into());
-                }
-                value
-            }
-        };
+        let value = self.written(&name, written, own, asked)?;
         if declared.choices.is_empty() && !declared.bounds.contain(value) {
             let unit = &declared.unit;
             let place = asked
@@ -213,7 +188,45 @@ impl LawShelf<'_> {
                 place.unwrap_or_default(),
                 declared.bounds
             );
-            return Err(wrong(&at, message).label(declared.doc.clone()).into());
+            let error = wrong(&written.span(), message);
+            return Err(error.label(declared.doc.clone()).into());
+        }
+        Ok(value)
+    }
+
+    /// The value that is written for a parameter, which may follow from others.
+    fn written(
+        &self,
+        name: &str,
+        written: &Spanned<ParameterValue>,
+        own: (String, String),
+        asked: &Asked<'_>,
+    ) -> Result<f64, Without> {
+        let at = written.span();
+        let label = match written.get_ref() {
+            ParameterValue::Number(number) => return Ok(*number),
+            ParameterValue::Integer(number) => return Ok(*number as f64),
+            ParameterValue::Varying(over) => {
+                let profile = ProfileInput::Over(over.clone()).read(self.source, at)?;
+                let ([_, height], _) = asked.place.ok_or(Without::Place)?;
+                return Ok(profile.at(*height));
+            }
+            ParameterValue::Label(label) => label,
+        };
+        let wrong = |at: &Range<usize>, message: String| self.source.error(at.clone(), message);
+        let Some(text) = Expression::text(label) else {
+            let message = format!("`{name}` is \"{label}\", no number");
+            return Err(wrong(&asked.by, message).into());
+        };
+        let expression =
+            Expression::parse(text).map_err(|why| wrong(&at, format!("`{name}`: {why}")))?;
+        let mut asked = asked.clone();
+        asked.chain.push(own);
+        asked.by.clone_from(&at);
+        let value = expression.value(&mut |reference| self.referred(reference, &asked))?;
+        if !value.is_finite() {
+            let message = format!("`{name}`: the expression gives {value}, no number");
+            return Err(wrong(&at, message).into());
         }
         Ok(value)
     }
@@ -278,11 +291,7 @@ impl LawShelf<'_> {
         }
         let table = self.valued_on(law, entry, asked)?;
         let built = self.built(law, (entry, &loaded, &table))?;
-        let mut initial = Vec::new();
-        for (variable, value) in &self.tables().initial(entry) {
-            let number = internal_variable(self.source, &built.law, law, variable)?;
-            initial.push((number, *value.get_ref()));
-        }
+        let initial = self.initial(entry, &built.law, law)?;
         let elastic = built.law.at_rest_from(stress, &initial, Operator::Elastic);
         let (_, operator) = elastic.map_err(|failure| {
             let ([x, y], [s11, s22, s33, s12]) = (at, stress);

@@ -9,7 +9,7 @@ use crate::material::{
     place_failure, try_law,
 };
 use abi::Hypothesis;
-use law::{BuildCause, BuiltLaw, LoadedLaw, SearchPath};
+use law::{BuildCause, BuiltLaw, Law, LoadedLaw, SearchPath};
 use mechanics::mesh::Mesh;
 use mechanics::model;
 use mechanics::problem::{Formulation, Ground, Material, Variation, Water};
@@ -78,41 +78,11 @@ impl<'a> LawShelf<'a> {
                 offered.is_some()
             });
         let hypothesis = model::hypothesis(self.file.analysis, group.formulation, is_interface_law);
-        let key = (name.get_ref().clone(), hypothesis.name());
         let (mut parameters, elements) = self.valued_in(number, name.get_ref(), entry)?;
         let handed = self.consolidation(group, name, entry, &parameters)?;
         parameters.extend(handed.clone());
-        let built = if let Some(built) = self.laws.get(&key) {
-            Arc::clone(built)
-        } else {
-            let loaded = self.loaded(entry)?;
-            let built = try_law(&loaded, hypothesis, &parameters).map_err(|failure| {
-                let error = place_failure(self.source, &entry.law, &parameters, &failure);
-                if !matches!(failure.cause, BuildCause::Hypothesis { .. }) {
-                    error
-                } else if let Some(adapter) =
-                    entry.adapter.as_ref().filter(|_| entry.is_shear_zone())
-                {
-                    let message = format!(
-                        "law `{}` is a shear zone, made for interface_2d, expected {}",
-                        name.get_ref(),
-                        hypothesis.name()
-                    );
-                    let error = self.source.error(adapter.span(), message);
-                    self.explain(error.into(), group_name, group, name)
-                } else {
-                    let error = self.explain(error, group_name, group, name);
-                    if is_solid_at_interface(&failure) {
-                        error.with_hint(ZONE)
-                    } else {
-                        error
-                    }
-                }
-            })?;
-            let built = Arc::new(built);
-            self.laws.insert(key, Arc::clone(&built));
-            built
-        };
+        let taken = (group_name, group, name);
+        let built = self.built_for((entry, hypothesis), &parameters, taken)?;
         let mut material = Material::new(name.get_ref(), built);
         material.varying = if elements.is_empty() {
             self.varying(entry, hypothesis, &parameters)?
@@ -129,16 +99,65 @@ impl<'a> LawShelf<'a> {
             }
         }
         let law = &material.built.law;
+        material.initial = self.initial(entry, law, &law.description().id)?;
+        Ok(material)
+    }
+
+    /// The internal variables that a law starts with, by their numbers.
+    pub(super) fn initial(
+        &self,
+        entry: &LawInput,
+        law: &Law,
+        name: &str,
+    ) -> Result<Vec<(usize, f64)>, Error> {
+        let mut initial = Vec::new();
         for (variable, value) in &self.tables().initial(entry) {
             if !value.get_ref().is_finite() {
                 let message = "expected a finite number";
                 return Err(self.source.error(value.span(), message).into());
             }
-            let id = &law.description().id;
-            let number = internal_variable(self.source, law, id, variable)?;
-            material.initial.push((number, *value.get_ref()));
+            let number = internal_variable(self.source, law, name, variable)?;
+            initial.push((number, *value.get_ref()));
         }
-        Ok(material)
+        Ok(initial)
+    }
+
+    /// The law of an entry for a hypothesis, built once. The group is that which takes it.
+    fn built_for(
+        &mut self,
+        (entry, hypothesis): (&LawInput, Hypothesis),
+        parameters: &ParameterTable,
+        (group_name, group, name): (&Spanned<String>, &GroupInput, &Spanned<String>),
+    ) -> Result<Arc<BuiltLaw>, Error> {
+        let key = (name.get_ref().clone(), hypothesis.name());
+        if let Some(built) = self.laws.get(&key) {
+            return Ok(Arc::clone(built));
+        }
+        let loaded = self.loaded(entry)?;
+        let built = try_law(&loaded, hypothesis, parameters).map_err(|failure| {
+            let error = place_failure(self.source, &entry.law, parameters, &failure);
+            if !matches!(failure.cause, BuildCause::Hypothesis { .. }) {
+                return error;
+            }
+            let zone = entry.adapter.as_ref().filter(|_| entry.is_shear_zone());
+            let error = zone.map_or(error, |adapter| {
+                let message = format!(
+                    "law `{}` is a shear zone, made for interface_2d, expected {}",
+                    name.get_ref(),
+                    hypothesis.name()
+                );
+                self.source.error(adapter.span(), message).into()
+            });
+            let error = self.explain(error, group_name, group, name);
+            if zone.is_none() && is_solid_at_interface(&failure) {
+                error.with_hint(ZONE)
+            } else {
+                error
+            }
+        })?;
+        let built = Arc::new(built);
+        self.laws.insert(key, Arc::clone(&built));
+        Ok(built)
     }
 
     /// Parameters of a law that vary with the height.

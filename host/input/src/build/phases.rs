@@ -4,22 +4,15 @@ use crate::Error;
 use crate::case::{CaseFile, DirectedStrain, PhaseInput, StrainInput};
 use crate::ground::level;
 use crate::spanned::Given;
-use mechanics::problem::{Analysis, Axis, Displacement, Force, Free, Phase, Pressure, Until};
-use text::Source;
+use mechanics::problem::{Analysis, Displacement, Force, Free, Phase, Pressure, Until};
+use text::{Named, Source};
 use toml::Spanned;
 
 /// A phase without its laws.
 pub(super) fn phase(source: &Source, file: &CaseFile, input: &PhaseInput) -> Result<Phase, Error> {
-    let axes = |axes: &[crate::case::Axis]| -> Vec<Axis> {
-        axes.iter().map(|&axis| axis.into()).collect()
-    };
-    // Unknown names were refused.
-    let number = |name: &Spanned<String>| {
-        file.groups
-            .keys()
-            .position(|key| key.get_ref() == name.get_ref())
-    };
+    let number = |name: &Spanned<String>| number(file, name);
     let numbers = |names: &[Spanned<String>]| names.iter().filter_map(number).collect();
+    let lines = |names: &[Spanned<String>]| names.iter().map(|n| n.get_ref().clone()).collect();
     let displacement = input.displacement.iter().map(|input| Displacement {
         line: input.line.get_ref().clone(),
         x: input.x,
@@ -27,7 +20,7 @@ pub(super) fn phase(source: &Source, file: &CaseFile, input: &PhaseInput) -> Res
     });
     let free = input.free.iter().map(|input| Free {
         line: input.line.get_ref().clone(),
-        components: axes(&input.components),
+        components: input.components.iter().map(|&axis| axis.into()).collect(),
     });
     let pressure = input.pressure.iter().map(|input| {
         Ok(Pressure {
@@ -40,10 +33,8 @@ pub(super) fn phase(source: &Source, file: &CaseFile, input: &PhaseInput) -> Res
         x: input.x,
         y: input.y,
     });
-    let weights = input.unit_weight.iter();
-    let drainage = input.drainage.iter();
-    let course = input.course.as_ref();
     let water = input.water.as_ref();
+    let water_level = water.map(|water| level(source, &water.get_ref().level));
     Ok(Phase {
         name: input.name.get_ref().clone(),
         increments: *input.increments.get_ref(),
@@ -51,29 +42,11 @@ pub(super) fn phase(source: &Source, file: &CaseFile, input: &PhaseInput) -> Res
         materials: Vec::new(),
         activate: numbers(&input.activate),
         deactivate: numbers(&input.deactivate),
-        unit_weight: weights
-            .filter_map(|(name, weight)| Some((number(name)?, *weight.get_ref())))
-            .collect(),
-        water_level: water
-            .map(|water| level(source, &water.get_ref().level))
-            .transpose()?,
-        drainage: drainage
-            .filter_map(|(name, drainage)| Some((number(name)?, *drainage.get_ref())))
-            .collect(),
-        rigid: input
-            .rigid
-            .iter()
-            .map(|line| line.get_ref().clone())
-            .collect(),
-        course: match course {
-            Some(course) if course.get_ref().is_empty() => {
-                let message = "`course` is empty; left out, a phase's loads rise straight";
-                return Err(source.error(course.span(), message).into());
-            }
-            course => course
-                .map(|course| course.get_ref().clone())
-                .unwrap_or_default(),
-        },
+        unit_weight: of_groups(file, &input.unit_weight),
+        water_level: water_level.transpose()?,
+        drainage: of_groups(file, &input.drainage),
+        rigid: lines(&input.rigid),
+        course: course(source, input)?,
         until: input.until.as_ref().map(|until| Until {
             quantity: until.get_ref().quantity.get_ref().clone(),
             reaches: until.get_ref().reaches,
@@ -85,6 +58,32 @@ pub(super) fn phase(source: &Source, file: &CaseFile, input: &PhaseInput) -> Res
         free: free.collect(),
         pressure: pressure.collect::<Result<_, Error>>()?,
     })
+}
+
+/// The number of a group; unknown names were refused.
+fn number(file: &CaseFile, name: &Spanned<String>) -> Option<usize> {
+    let mut names = file.groups.keys();
+    names.position(|key| key.get_ref() == name.get_ref())
+}
+
+/// Values by the numbers of their groups.
+fn of_groups<T: Copy>(file: &CaseFile, given: &Named<T>) -> Vec<(usize, T)> {
+    let given = given.iter();
+    given
+        .filter_map(|(name, value)| Some((number(file, name)?, *value.get_ref())))
+        .collect()
+}
+
+/// The course of a phase's changes; empty where they rise straight.
+fn course(source: &Source, input: &PhaseInput) -> Result<Vec<[f64; 2]>, Error> {
+    let course = input.course.as_ref();
+    if let Some(course) = course.filter(|course| course.get_ref().is_empty()) {
+        let message = "`course` is empty; left out, a phase's loads rise straight";
+        return Err(source.error(course.span(), message).into());
+    }
+    Ok(course
+        .map(|course| course.get_ref().clone())
+        .unwrap_or_default())
 }
 
 /// The stress-free strains that a phase gives groups, along 11 22 33.
@@ -116,9 +115,7 @@ fn strains(
                 own.map(|value| value.unwrap_or(0.0))
             }
         };
-        // Unknown names were refused.
-        let mut names = file.groups.keys();
-        if let Some(number) = names.position(|key| key.get_ref() == name.get_ref()) {
+        if let Some(number) = number(file, name) {
             strains.push((number, strain));
         }
     }

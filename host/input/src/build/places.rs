@@ -42,22 +42,15 @@ impl Case {
                 place.unwrap_or(name.span())
             }),
             Item::LawOf { group: of, phase } => group(*of).map(|(name, group)| {
-                let swap = || {
-                    let laws = &file.phases.get((*phase)?)?.laws;
-                    laws.iter().find(|(key, _)| *key == name)
-                };
-                let own = || group.get_ref().law.span();
-                swap().map_or_else(own, |(_, law)| law.span())
+                let swap = phase.and_then(|phase| file.phases.get(phase)?.laws.get(name));
+                swap.unwrap_or(&group.get_ref().law).span()
             }),
             Item::Material(name) => {
                 let mut laws = file.laws.keys();
                 laws.find(|key| key.get_ref() == name).map(Spanned::span)
             }
             Item::Support(number) => file.supports.get(*number).map(|s| s.line.span()),
-            Item::Water(None) => {
-                let water = file.water.as_ref();
-                water.map(|water| water.get_ref().level.span())
-            }
+            Item::Water(None) => file.water.as_ref().map(|w| w.get_ref().level.span()),
             Item::Activation {
                 phase: of,
                 group: number,

@@ -111,7 +111,7 @@ pub(super) fn assemble(contents: &Contents<'_>, wanted: &Wanted<'_>) -> Result<A
     })
 }
 
-impl Assembly<'_> {
+impl<'a> Assembly<'a> {
     fn fault<T>(&self, element: &Element, message: &str) -> Result<T, Fault> {
         Err(self.contents.cursor.fault(element.place, message))
     }
@@ -374,26 +374,19 @@ impl Assembly<'_> {
                 let both = || self.contents.two_elements(other, element);
                 if side.ends == [b, a] && side.owners[1].is_none() {
                     side.owners[1] = owner;
-                } else if side.ends == [b, a] {
-                    let message = format!(
-                        "{} is the third one on a side of {}",
-                        self.contents.element(element),
-                        self.contents.element(other)
-                    );
-                    return self.fault(element, &message);
-                } else if side.ends == [a, b] {
-                    let message = format!(
-                        "{} lie on each other: both are on the same side of an edge",
-                        both()
-                    );
-                    return self.fault(element, &message);
-                } else {
-                    let message = format!(
-                        "{} have the middle of a side in common, but not its ends",
-                        both()
-                    );
-                    return self.fault(element, &message);
+                    continue;
                 }
+                let message = if side.ends == [b, a] {
+                    let [third, other] = [element, other].map(|e| self.contents.element(e));
+                    format!("{third} is the third one on a side of {other}")
+                } else if side.ends == [a, b] {
+                    let both = both();
+                    format!("{both} lie on each other: both are on the same side of an edge")
+                } else {
+                    let both = both();
+                    format!("{both} have the middle of a side in common, but not its ends")
+                };
+                return self.fault(element, &message);
             }
         }
         let mut corners = sides.iter().zip(&is_corner).filter(|(_, is)| **is);
@@ -414,6 +407,52 @@ impl Assembly<'_> {
         self.fault(element, &message)
     }
 
+    /// Elements of a dimension in physical groups, and the names of these.
+    fn named(&self, dimension: u8) -> impl Iterator<Item = (&'a Element, Vec<String>)> {
+        let contents = self.contents;
+        let elements = contents.elements.iter();
+        let own = elements.filter(move |element| element.kind.dimension() == dimension);
+        own.map(|element| (element, contents.groups_of(element).collect()))
+            .filter(|(_, names): &(_, Vec<String>)| !names.is_empty())
+    }
+
+    /// The lines of physical curves, each with its first element.
+    fn curves(
+        &self,
+        number: &HashMap<usize, usize>,
+        sides: &[Option<Side>],
+    ) -> Result<IndexMap<String, (Line, &'a Element)>, Fault> {
+        let contents = self.contents;
+        let mut seen: HashSet<(String, usize)> = HashSet::new();
+        let mut of_name: IndexMap<String, (Line, &Element)> = IndexMap::new();
+        let has_first = contents.elements.iter().any(|e| e.kind == Kind::Line2);
+        let of_ends = middles(if has_first { sides } else { &[] });
+        for (element, names) in self.named(1) {
+            let nodes = contents.nodes_of(element)?;
+            let own = nodes.map(|node| number.get(&node).copied());
+            let side = side_on(element.kind, own, (sides, &of_ends));
+            // Where a surface is left out, its outline is.
+            let is_outside = self.outside.contains(&ends_of(nodes[0], nodes[1]));
+            for name in names {
+                let (line, _) = of_name
+                    .entry(name.clone())
+                    .or_insert_with(|| (Line::default(), element));
+                if let Some((middle, side)) = side {
+                    if seen.insert((name, middle)) {
+                        line.edges.extend(side.owners.iter().flatten());
+                    }
+                } else if self.wanted.lines.contains(name.as_str()) && !is_outside {
+                    let message = format!(
+                        "{} of the physical curve `{name}` is no side of an element of the case's groups",
+                        contents.element(element)
+                    );
+                    return self.fault(element, &message);
+                }
+            }
+        }
+        Ok(of_name)
+    }
+
     /// Names the lines and points of the mesh.
     fn lines(
         &self,
@@ -421,62 +460,19 @@ impl Assembly<'_> {
         number: &HashMap<usize, usize>,
         sides: &[Option<Side>],
     ) -> Result<(), Fault> {
-        let contents = self.contents;
-        let mut seen: HashSet<(String, usize)> = HashSet::new();
-        let mut of_name: IndexMap<String, (Line, &Element)> = IndexMap::new();
-        let mut is_curve: HashSet<String> = HashSet::new();
-        let has_first = contents.elements.iter().any(|e| e.kind == Kind::Line2);
-        let of_ends = middles(if has_first { sides } else { &[] });
-        for dimension in [1, 0] {
-            let own = |e: &&Element| e.kind.dimension() == dimension;
-            for element in contents.elements.iter().filter(own) {
-                let names: Vec<String> = contents.groups_of(element).collect();
-                if names.is_empty() {
-                    continue;
-                }
-                let nodes = contents.nodes_of(element)?;
-                let own = nodes.map(|node| number.get(&node).copied());
-                for name in names {
-                    if dimension == 1 {
-                        is_curve.insert(name.clone());
-                    } else if is_curve.contains(&name) {
-                        // The curve of this name is taken.
-                        continue;
-                    }
-                    let (line, _) = of_name
-                        .entry(name.clone())
-                        .or_insert_with(|| (Line::default(), element));
-                    if dimension == 0 {
-                        if let Some(node) = own[0]
-                            && seen.insert((name, node))
-                        {
-                            line.nodes.push(node);
-                        }
-                        continue;
-                    }
-                    let ends = [own[0], own[1]];
-                    if let [Some(a), Some(b)] = ends
-                        && let Some(middle) = own[2].or_else(|| {
-                            let is_first = element.kind.is_first_order();
-                            of_ends.get(&ends_of(a, b)).copied().filter(|_| is_first)
-                        })
-                        && let Some(side) = &sides[middle]
-                        && ends_of(side.ends[0], side.ends[1]) == ends_of(a, b)
-                    {
-                        if seen.insert((name, middle)) {
-                            line.edges.extend(side.owners.iter().flatten());
-                        }
-                        continue;
-                    }
-                    // Where a surface is left out, its outline is.
-                    let is_outside = self.outside.contains(&ends_of(nodes[0], nodes[1]));
-                    if self.wanted.lines.contains(name.as_str()) && !is_outside {
-                        let message = format!(
-                            "{} of the physical curve `{name}` is no side of an element of the case's groups",
-                            self.contents.element(element)
-                        );
-                        return self.fault(element, &message);
-                    }
+        let mut of_name = self.curves(number, sides)?;
+        let mut seen = HashSet::new();
+        for (element, names) in self.named(0) {
+            let node = number.get(&self.contents.nodes_of(element)?[0]).copied();
+            for name in names {
+                let new = || (Line::default(), element);
+                let (line, first) = of_name.entry(name.clone()).or_insert_with(new);
+                // Else the curve of this name is taken.
+                if first.kind.dimension() == 0
+                    && let Some(node) = node
+                    && seen.insert((name, node))
+                {
+                    line.nodes.push(node);
                 }
             }
         }
@@ -573,6 +569,24 @@ fn middles(sides: &[Option<Side>]) -> HashMap<Ends, usize> {
     let sides = sides.iter().enumerate();
     let known = sides.filter_map(|(at, side)| side.map(|side| (side.ends, at)));
     known.map(|([a, b], at)| (ends_of(a, b), at)).collect()
+}
+
+/// The side of the mesh on which an element of a curve lies, and the middle of it.
+fn side_on<'s>(
+    kind: Kind,
+    nodes: [Option<usize>; MOST_NODES],
+    (sides, of_ends): (&'s [Option<Side>], &HashMap<Ends, usize>),
+) -> Option<(usize, &'s Side)> {
+    let ends = ends_of(nodes[0]?, nodes[1]?);
+    let of_first_order = || {
+        of_ends
+            .get(&ends)
+            .copied()
+            .filter(|_| kind.is_first_order())
+    };
+    let middle = nodes[2].or_else(of_first_order)?;
+    let side = sides[middle].as_ref()?;
+    (ends_of(side.ends[0], side.ends[1]) == ends).then_some((middle, side))
 }
 
 /// An element of the mesh, its nodes counter-clockwise.

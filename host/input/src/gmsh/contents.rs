@@ -11,6 +11,15 @@ use std::collections::HashMap;
 /// In place of a node that an element does not have.
 pub(super) const NO_NODE: usize = usize::MAX;
 
+/// Sections that are understood; each comes once.
+const SECTIONS: [&str; 5] = [
+    "MeshFormat",
+    "PhysicalNames",
+    "Entities",
+    "Nodes",
+    "Elements",
+];
+
 /// What a mesh file says.
 #[derive(Debug)]
 pub(super) struct Contents<'a> {
@@ -92,48 +101,7 @@ impl<'a> Contents<'a> {
             sets: Sets::default(),
             version,
         };
-        let mut read: Vec<&str> = Vec::new();
-        loop {
-            let at = reader.contents.cursor.at();
-            let Some(name) = reader.contents.cursor.section()? else {
-                break;
-            };
-            // Nodes may have parameters (formats 2).
-            let with_parameters = name == "ParametricNodes" && version == Version::Two;
-            let what = if with_parameters { "Nodes" } else { &name };
-            let ours = ["PhysicalNames", "Entities", "Nodes", "Elements"];
-            let ours = ours.into_iter().find(|ours| *ours == what);
-            if ours.is_some_and(|ours| read.contains(&ours)) {
-                let message = format!("section `${what}` comes twice");
-                return Err(reader.contents.cursor.fault(at, &message));
-            }
-            match (what, version) {
-                ("MeshFormat", _) => {
-                    let message = "section `$MeshFormat` comes twice";
-                    return Err(reader.contents.cursor.fault(at, message));
-                }
-                ("PartitionedEntities", _) => {
-                    let message = "the mesh is in several partitions; save it in one";
-                    return Err(reader.contents.cursor.fault(at, message));
-                }
-                ("PhysicalNames", _) => reader.names()?,
-                ("Nodes", Version::Two) => reader.nodes_2(with_parameters)?,
-                ("Elements", Version::Two) => reader.elements_2()?,
-                ("Entities", Version::Four | Version::FourOne) => reader.entities()?,
-                ("Nodes", _) => reader.nodes_4()?,
-                ("Elements", _) => reader.elements_4()?,
-                _ if name.starts_with("End") => {
-                    let message = format!("`${name}` ends no section");
-                    return Err(reader.contents.cursor.fault(at, &message));
-                }
-                _ => {
-                    reader.contents.cursor.skip_to_end(&name)?;
-                    continue;
-                }
-            }
-            reader.contents.cursor.end(&name)?;
-            read.extend(ours);
-        }
+        let read = reader.sections()?;
         let mut contents = reader.contents;
         contents.sets = reader.sets.all;
         for wanted in ["Nodes", "Elements"] {
@@ -228,6 +196,47 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
+    /// Reads the sections of the file; returns the names of those that are understood.
+    fn sections(&mut self) -> Result<Vec<&'static str>, Fault> {
+        let mut read = vec!["MeshFormat"];
+        loop {
+            let at = self.contents.cursor.at();
+            let Some(name) = self.contents.cursor.section()? else {
+                break;
+            };
+            // Nodes may have parameters (formats 2).
+            let with_parameters = name == "ParametricNodes" && self.version == Version::Two;
+            let what = if with_parameters { "Nodes" } else { &name };
+            let ours = SECTIONS.into_iter().find(|ours| *ours == what);
+            let refused = if ours.is_some_and(|ours| read.contains(&ours)) {
+                Some(format!("section `${what}` comes twice"))
+            } else if what == "PartitionedEntities" {
+                Some("the mesh is in several partitions; save it in one".to_owned())
+            } else {
+                name.starts_with("End")
+                    .then(|| format!("`${name}` ends no section"))
+            };
+            if let Some(message) = refused {
+                return Err(self.contents.cursor.fault(at, &message));
+            }
+            match (what, self.version) {
+                ("PhysicalNames", _) => self.names()?,
+                ("Nodes", Version::Two) => self.nodes_2(with_parameters)?,
+                ("Elements", Version::Two) => self.elements_2()?,
+                ("Entities", Version::Four | Version::FourOne) => self.entities()?,
+                ("Nodes", _) => self.nodes_4()?,
+                ("Elements", _) => self.elements_4()?,
+                _ => {
+                    self.contents.cursor.skip_to_end(&name)?;
+                    continue;
+                }
+            }
+            self.contents.cursor.end(&name)?;
+            read.extend(ours);
+        }
+        Ok(read)
+    }
+
     /// Names of physical groups: text in any encoding.
     fn names(&mut self) -> Result<(), Fault> {
         let Contents {
@@ -238,18 +247,15 @@ impl Reader<'_> {
         } = &mut self.contents;
         let encoding = std::mem::replace(&mut cursor.encoding, Encoding::Text);
         let read = (|| {
-            let n = cursor.count("the number of names", 3, 0)?;
-            for _ in 0..n {
+            for _ in 0..cursor.count("the number of names", 3, 0)? {
                 let at = cursor.at();
                 // Format 2.0 says no dimension: a name is that of all groups of its number.
                 let first = cursor.integer("the dimension of a name")?;
                 let (dimensions, number) = if cursor.is_at(b'"') {
                     (0..=3, first)
                 } else {
-                    (
-                        first..=first,
-                        cursor.integer("the number of a physical group")?,
-                    )
+                    let number = cursor.integer("the number of a physical group")?;
+                    (first..=first, number)
                 };
                 if !(0..=3).contains(dimensions.start()) {
                     return Err(cursor.fault(at, "a physical group has a dimension from 0 to 3"));

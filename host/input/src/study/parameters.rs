@@ -198,6 +198,52 @@ fn wrong_levels(
     }
 }
 
+/// The keys that a parameter sets, and its name, the first of them where it has no other.
+fn keys_and_name(source: &Source, input: &ParameterInput) -> Result<(Vec<String>, String), Error> {
+    let key = input.key.span();
+    let keys = match input.key.get_ref() {
+        Keys::One(key) => vec![key.trim().to_owned()],
+        Keys::Several(keys) => keys.iter().map(|key| key.trim().to_owned()).collect(),
+    };
+    let are_named = keys.iter().all(|key| !key.is_empty());
+    let Some(first) = keys.first().filter(|_| are_named) else {
+        let message = "`key`: expected the dotted path of a key of the case";
+        return Err(source.error(key, message).into());
+    };
+    let name = input.name.as_ref().map_or(first, Spanned::get_ref).clone();
+    if name.is_empty() || COLUMNS.contains(&name.as_str()) {
+        let span = input.name.as_ref().map_or(key, Spanned::span);
+        let message = format!(
+            "`{name}` is no name for a parameter: the table of runs has a column of this name"
+        );
+        return Err(source.error(span, message).into());
+    }
+    Ok((keys, name))
+}
+
+/// What a parameter, which stands at `span`, is spread over: one thing.
+fn spread(
+    source: &Source,
+    input: &ParameterInput,
+    name: &str,
+    span: Range<usize>,
+) -> Result<NamedSpread, Error> {
+    let mut spreads = spreads(source, input)?;
+    if spreads.len() > 1 {
+        let names = spreads.iter().map(|(name, ..)| format!("`{name}`"));
+        let names = names.collect::<Vec<_>>().join(" and ");
+        let message = format!("{names} are given: a parameter has one of them");
+        return Err(source.error(spreads[1].1.clone(), message).into());
+    }
+    spreads.pop().ok_or_else(|| {
+        let message = format!(
+            "`{name}` has no values: expected `values`, `uniform`, `log_uniform` or `normal`"
+        );
+        let end = span.start + source.text()[span.clone()].find('\n').unwrap_or(span.len());
+        source.error(span.start..end, message).into()
+    })
+}
+
 pub(super) fn parameter(
     source: &Source,
     method: Method,
@@ -206,55 +252,13 @@ pub(super) fn parameter(
     let span = input.span();
     let input = input.get_ref();
     let wrong = |span: Range<usize>, message: String| Err(source.error(span, message).into());
-    let key = input.key.span();
-    let keys = match input.key.get_ref() {
-        Keys::One(key) => vec![key.trim().to_owned()],
-        Keys::Several(keys) => keys.iter().map(|key| key.trim().to_owned()).collect(),
-    };
-    let Some(first) = keys
-        .first()
-        .filter(|_| keys.iter().all(|key| !key.is_empty()))
-    else {
-        return wrong(
-            key,
-            "`key`: expected the dotted path of a key of the case".to_owned(),
-        );
-    };
-    let name = input.name.as_ref().map_or(first, Spanned::get_ref).clone();
-    if name.is_empty() || COLUMNS.contains(&name.as_str()) {
-        let span = input.name.as_ref().map_or(key, Spanned::span);
-        let message = format!(
-            "`{name}` is no name for a parameter: the table of runs has a column of this name"
-        );
-        return wrong(span, message);
-    }
-    let mut spreads = spreads(source, input)?;
-    let mut values: Vec<Range<usize>> = Vec::new();
-    if let Some(listed) = &input.values {
-        values = listed.get_ref().iter().map(Spanned::span).collect();
-    }
-    if spreads.len() > 1 {
-        let names: Vec<String> = spreads
-            .iter()
-            .map(|(name, ..)| format!("`{name}`"))
-            .collect();
-        let message = format!(
-            "{} are given: a parameter has one of them",
-            names.join(" and ")
-        );
-        return wrong(spreads[1].1.clone(), message);
-    }
-    let Some((called, place, spread)) = spreads.pop() else {
-        let message = format!(
-            "`{name}` has no values: expected `values`, `uniform`, `log_uniform` or `normal`"
-        );
-        let end = span.start + source.text()[span.clone()].find('\n').unwrap_or(span.len());
-        return wrong(span.start..end, message);
-    };
+    let (keys, name) = keys_and_name(source, input)?;
+    let (called, place, spread) = spread(source, input, &name, span)?;
     let is_listed = matches!(spread, Spread::Values(_));
-    if values.is_empty() {
-        values = vec![place.clone()];
-    }
+    let values = match &input.values {
+        Some(listed) => listed.get_ref().iter().map(Spanned::span).collect(),
+        None => vec![place.clone()],
+    };
     if method == Method::List && !is_listed {
         return wrong(place, format!("`{called}`: a list takes `values`"));
     }
@@ -274,7 +278,7 @@ pub(super) fn parameter(
         spread,
         whole: input.whole,
         levels: input.levels.value(),
-        key,
+        key: input.key.span(),
         values,
     })
 }

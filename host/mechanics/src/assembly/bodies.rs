@@ -2,6 +2,7 @@
 
 use super::Tie;
 use crate::group::Group;
+use crate::joined::Joined;
 
 /// A node, or a degree of freedom, that several bodies have in common, or none.
 pub const SHARED: u32 = u32::MAX;
@@ -22,23 +23,18 @@ impl Bodies {
     /// Those of these groups on these nodes, where these degrees of freedom are prescribed.
     pub fn new(groups: &[Group], ties: &[Tie], nodes: &[[f64; 2]], prescribed: &[bool]) -> Self {
         let is_held = |node: usize| prescribed[2 * node] && prescribed[2 * node + 1];
-        let mut joined = Joined::new(nodes.len());
-        for tie in ties {
-            for (master, _) in tie.masters {
-                joined.join(tie.dof / 2, master / 2);
-            }
-        }
         let loose = |group: &Group, element: usize| -> Vec<usize> {
             let nodes = group.kinematics.nodes(element).iter().copied();
             nodes.filter(|&node| !is_held(node)).collect()
         };
+        let mut joined = Joined::new(nodes.len());
+        for tie in ties {
+            let masters = tie.masters.iter().map(|(master, _)| master / 2);
+            joined.join([tie.dof / 2].into_iter().chain(masters));
+        }
         for group in groups.iter().filter(|group| group.is_active) {
             for element in 0..group.kinematics.n_elements() {
-                if let [first, others @ ..] = loose(group, element).as_slice() {
-                    for &node in others {
-                        joined.join(*first, node);
-                    }
-                }
+                joined.join(loose(group, element));
             }
         }
         let mut numbers = vec![SHARED; nodes.len()];
@@ -65,10 +61,8 @@ impl Bodies {
                 bodies.push(number);
                 let [least, most] = &mut boxes[number as usize];
                 for &node in group.kinematics.nodes(element) {
-                    for c in 0..2 {
-                        least[c] = least[c].min(nodes[node][c]);
-                        most[c] = most[c].max(nodes[node][c]);
-                    }
+                    *least = [0, 1].map(|c| least[c].min(nodes[node][c]));
+                    *most = [0, 1].map(|c| most[c].max(nodes[node][c]));
                     let known = of_node[node].get_or_insert(number);
                     if *known != number {
                         *known = SHARED;
@@ -106,28 +100,6 @@ impl Bodies {
             return Vec::new();
         }
         dofs.map(|dof| self.of_node[dof / 2]).collect()
-    }
-}
-
-/// Sets that grow together.
-struct Joined(Vec<usize>);
-
-impl Joined {
-    fn new(n: usize) -> Self {
-        Self((0..n).collect())
-    }
-
-    fn root(&mut self, mut node: usize) -> usize {
-        while self.0[node] != node {
-            self.0[node] = self.0[self.0[node]];
-            node = self.0[node];
-        }
-        node
-    }
-
-    fn join(&mut self, a: usize, b: usize) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.0[a.max(b)] = a.min(b);
     }
 }
 
@@ -176,14 +148,5 @@ mod tests {
         let v: Vec<f64> = (1..=25).map(f64::from).collect();
         assert_eq!(norms(&[], 1, &v[..24]), [70.0]);
         assert_eq!(norms(&[1; 25], 2, &v), [0.0, f64::sqrt(5525.0)]);
-    }
-
-    #[test]
-    fn what_is_joined_by_way_of_others_is_one() {
-        let mut joined = Joined::new(5);
-        joined.join(0, 3);
-        joined.join(4, 3);
-        let roots: Vec<usize> = (0..5).map(|node| joined.root(node)).collect();
-        assert_eq!(roots, [0, 1, 2, 0, 0]);
     }
 }

@@ -29,19 +29,7 @@ pub(crate) fn check(problem: &Problem, ties: &[Tie]) -> Result<Vec<String>, Refu
         held: HashMap::new(),
         values: HashMap::new(),
     };
-    for (number, support) in problem.supports.iter().enumerate() {
-        let item = Item::Support(number);
-        if support.fixed.is_empty() {
-            let line = support.line.clone();
-            let is_free = false;
-            return Err(Refusal::new(item, Cause::NoComponents { line, is_free }));
-        }
-        for axis in &support.fixed {
-            for dof in constraints.dofs(&support.line, *axis, &item)? {
-                constraints.held.insert(dof, Holder::Support);
-            }
-        }
-    }
+    constraints.support()?;
     let mut warnings = Vec::new();
     // What is held in each phase.
     let mut held: Vec<HashMap<usize, Holder>> = Vec::new();
@@ -104,6 +92,23 @@ struct Constraints<'a> {
 }
 
 impl<'a> Constraints<'a> {
+    /// Holds what supports fix.
+    fn support(&mut self) -> Result<(), Refusal> {
+        for (number, support) in self.problem.supports.iter().enumerate() {
+            let item = Item::Support(number);
+            if support.fixed.is_empty() {
+                let line = support.line.clone();
+                let is_free = false;
+                return Err(Refusal::new(item, Cause::NoComponents { line, is_free }));
+            }
+            for axis in &support.fixed {
+                let dofs = self.dofs(&support.line, *axis, &item)?;
+                self.held.extend(dofs.map(|dof| (dof, Holder::Support)));
+            }
+        }
+        Ok(())
+    }
+
     fn dofs(
         &self,
         name: &str,

@@ -73,6 +73,12 @@ fn check_group(number: usize, group: &ElementGroup, is_undrained: bool) -> Resul
             return refuse(Key::UndrainedPoissonRatio, cause);
         }
     }
+    check_initial_stress(number, group)
+}
+
+fn check_initial_stress(number: usize, group: &ElementGroup) -> Result<(), Refusal> {
+    let refuse = |key, cause| Err(Refusal::new(Item::GroupKey(number, key), cause));
+    let is_solid = group.formulation == Formulation::Solid;
     match &group.initial_stress {
         Some(InitialStress::Constant(stress)) if stress.iter().any(|s| !s.is_finite()) => {
             refuse(Key::InitialStress, Cause::NotFinite("`initial_stress`"))

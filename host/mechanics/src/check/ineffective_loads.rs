@@ -35,6 +35,39 @@ impl Load<'_> {
         let input = phase.force.iter().find(|input| input.line == self.line)?;
         Some([input.x, input.y][usize::from(axis == Axis::Y)]?.abs())
     }
+
+    /// How much of it is lost, of this size on these edges of all.
+    fn part_lost(
+        &self,
+        problem: &Problem,
+        phase: &Phase,
+        size: f64,
+        [lost, all]: [&[(usize, usize)]; 2],
+    ) -> String {
+        let mesh = &problem.mesh;
+        let analysis = problem.analysis;
+        let area = |edges: &[(usize, usize)]| -> f64 {
+            let force = unit_pressure(analysis, mesh, edges);
+            let node = |f: &[f64]| f[0].hypot(f[1]);
+            force.chunks_exact(2).map(node).sum()
+        };
+        let (lost, all) = (area(lost), area(all));
+        let unit = analysis.force_unit();
+        let (what, force) = match self.axis {
+            None => ("pressure".to_owned(), size * lost),
+            Some(axis) => (
+                format!("force in {}", axis.name(analysis)),
+                size * lost / all,
+            ),
+        };
+        format!(
+            "phase `{}`: {:.3} % of the {what} on line `{}` ({force:.4e} {unit}) has no effect but \
+             on reactions: it acts where the displacement is held or prescribed",
+            phase.name,
+            100.0 * lost / all,
+            self.line,
+        )
+    }
 }
 
 /// Refuses loads that have no effect as long as they last; returns how much of others is lost. `held`: what is held in
@@ -101,7 +134,6 @@ fn lost(
             .into_iter()
             .all(|c| nodes.iter().all(|node| is_held(2 * node + c)))
     };
-    let name = load.line;
     let lost: Vec<(usize, usize)> = own.edges.iter().copied().filter(is_lost).collect();
     let point = own.edges.is_empty().then_some(load.axis).flatten();
     let is_all_of_point = point.is_some_and(|axis| {
@@ -110,37 +142,17 @@ fn lost(
     });
     if is_all_of_point || (!lost.is_empty() && lost.len() == own.edges.len()) {
         let cause = match load.axis {
-            None => Cause::LostPressure(name.to_owned()),
-            Some(axis) => Cause::LostForce(name.to_owned(), axis.name(problem.analysis)),
+            None => Cause::LostPressure(load.line.to_owned()),
+            Some(axis) => Cause::LostForce(load.line.to_owned(), axis.name(problem.analysis)),
         };
         return Err(Refusal::new(load.item.clone(), cause));
     }
     if lost.is_empty() || size == 0.0 {
         return Ok(None);
     }
-    let analysis = problem.analysis;
-    let area = |edges: &[(usize, usize)]| -> f64 {
-        let force = unit_pressure(analysis, mesh, edges);
-        let node = |f: &[f64]| f[0].hypot(f[1]);
-        force.chunks_exact(2).map(node).sum()
-    };
-    let (lost, all) = (area(&lost), area(&own.edges));
-    let unit = analysis.force_unit();
-    let (what, force) = match load.axis {
-        None => ("pressure".to_owned(), size * lost),
-        Some(axis) => (
-            format!("force in {}", axis.name(analysis)),
-            size * lost / all,
-        ),
-    };
-    Ok(Some(format!(
-        "phase `{}`: {:.3} % of the {what} on line `{name}` ({force:.4e} {unit}) has no effect but \
-         on reactions: it acts where the displacement is held or prescribed",
-        phases[number].name,
-        100.0 * lost / all,
-    )))
+    let edges = [&lost[..], &own.edges[..]];
+    Ok(Some(load.part_lost(problem, &phases[number], size, edges)))
 }
-
 /// The components in which an edge with these ends and middle faces.
 fn faced(at: &[[f64; 2]; 3]) -> Vec<usize> {
     // What the edge faces, by component: the other one of its directions.

@@ -3,7 +3,7 @@
 use super::{Cause, Item, JointFault, Refusal};
 use crate::element::Axes;
 use crate::ground::beside_joints;
-use crate::mesh::Solid;
+use crate::mesh::{Joint, Solid};
 use crate::problem::{Analysis, Formulation, Problem};
 
 /// The two faces of a zero-thickness element are at the same places within this part of its length.
@@ -48,6 +48,12 @@ pub(super) fn check(problem: &Problem) -> Result<(), Refusal> {
     if mesh.nodes.iter().flatten().any(|at| !at.is_finite()) {
         return refuse(Cause::NotFinite("a coordinate"));
     }
+    check_elements(problem)
+}
+
+/// Refuses elements of another formulation than their group's, and elements beyond the axis.
+fn check_elements(problem: &Problem) -> Result<(), Refusal> {
+    let mesh = &problem.mesh;
     let is_joint = |group: usize| problem.groups[group].formulation == Formulation::ZeroThickness;
     let solids = mesh.solids.iter().map(|solid| (solid.group, false));
     let joints = mesh.joints.iter().map(|joint| (joint.group, true));
@@ -82,6 +88,26 @@ pub(super) struct Face {
     pub(super) middle: usize,
 }
 
+/// What is wrong with the shape of a zero-thickness element.
+fn joint_fault(problem: &Problem, joint: &Joint) -> Option<JointFault> {
+    let place = |node: usize| problem.mesh.nodes[node];
+    let apart = |a: usize, b: usize| {
+        let ([x_a, y_a], [x_b, y_b]) = (place(a), place(b));
+        (x_b - x_a).hypot(y_b - y_a)
+    };
+    let length = apart(joint.minus[0], joint.minus[1]);
+    if length <= 0.0 {
+        return Some(JointFault::NoLength);
+    }
+    let mut pairs = joint.minus.into_iter().zip(joint.plus);
+    if pairs.any(|(minus, plus)| apart(minus, plus) > APART * length) {
+        return Some(JointFault::Apart);
+    }
+    let mut radii = joint.minus.into_iter().map(|node| place(node)[0]);
+    let on_axis = radii.all(|r| r <= BEYOND_AXIS * length);
+    (problem.analysis == Analysis::Axisymmetric && on_axis).then_some(JointFault::OnAxis)
+}
+
 /// Refuses invalid zero-thickness elements. Returns the faces with an adjacent solid.
 pub(super) fn joints(problem: &Problem) -> Result<Vec<Face>, Refusal> {
     let mesh = &problem.mesh;
@@ -89,10 +115,6 @@ pub(super) fn joints(problem: &Problem) -> Result<Vec<Face>, Refusal> {
     let mut faces = Vec::new();
     for joint in &mesh.joints {
         let place = |node: usize| mesh.nodes[node];
-        let apart = |a: usize, b: usize| {
-            let ([x_a, y_a], [x_b, y_b]) = (place(a), place(b));
-            (x_b - x_a).hypot(y_b - y_a)
-        };
         let [a, b, middle] = joint.minus;
         let refuse = |fault| {
             let group = problem.groups[joint.group].name.clone();
@@ -100,23 +122,13 @@ pub(super) fn joints(problem: &Problem) -> Result<Vec<Face>, Refusal> {
             let cause = Cause::BadJoint { group, at, fault };
             Err(Refusal::new(Item::Group(joint.group), cause))
         };
-        let length = apart(a, b);
-        if length <= 0.0 {
-            return refuse(JointFault::NoLength);
-        }
-        let mut pairs = joint.minus.into_iter().zip(joint.plus);
-        if pairs.any(|(minus, plus)| apart(minus, plus) > APART * length) {
-            return refuse(JointFault::Apart);
-        }
-        let radii = joint.minus.map(|node| place(node)[0]);
-        let on_axis = radii.into_iter().all(|r| r <= BEYOND_AXIS * length);
-        if problem.analysis == Analysis::Axisymmetric && on_axis {
-            return refuse(JointFault::OnAxis);
+        if let Some(fault) = joint_fault(problem, joint) {
+            return refuse(fault);
         }
         let chord = [0, 1].map(|c| place(b)[c] - place(a)[c]);
         let across = Axes::of_facet(chord).across;
         // Close to 45° the last bit of the coordinates says which side is that of the greater ones.
-        let is_told = (chord[0].abs() - chord[1].abs()).abs() > APART * length;
+        let is_told = (chord[0].abs() - chord[1].abs()).abs() > APART * chord[0].hypot(chord[1]);
         for (middle, side) in [(joint.minus[2], -1.0), (joint.plus[2], 1.0)] {
             let Some(&solid) = beside.get(&middle) else {
                 continue;

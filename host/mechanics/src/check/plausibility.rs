@@ -66,6 +66,23 @@ pub(crate) fn warnings(
     warnings
 }
 
+/// Whether a water table stands inside an element.
+fn is_cut(mesh: &Mesh, solid: &Solid, level: &Profile) -> bool {
+    let heights = solid.nodes().iter().map(|&node| {
+        let [x, y] = mesh.nodes[node];
+        [y, y - level.at(x)]
+    });
+    let ends = |c: usize| {
+        let all = heights.clone().map(|height| height[c]);
+        all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], h| {
+            [low.min(h), high.max(h)]
+        })
+    };
+    let ([bottom, top], [low, high]) = (ends(0), ends(1));
+    let least = ROUNDED * (top - bottom);
+    low < -least && high > least
+}
+
 /// Phases that change a water table which stands inside elements, before or after.
 fn water_inside(problem: &Problem) -> Vec<String> {
     let mesh = &problem.mesh;
@@ -78,25 +95,10 @@ fn water_inside(problem: &Problem) -> Vec<String> {
         let Some(next) = phase.water_level.as_ref().filter(|next| *next != level) else {
             continue;
         };
-        let is_cut = |solid: &&Solid, level: &Profile| {
-            let heights = solid.nodes().iter().map(|&node| {
-                let [x, y] = mesh.nodes[node];
-                [y, y - level.at(x)]
-            });
-            let ends = |c: usize| {
-                let all = heights.clone().map(|height| height[c]);
-                all.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], h| {
-                    [low.min(h), high.max(h)]
-                })
-            };
-            let ([bottom, top], [low, high]) = (ends(0), ends(1));
-            let least = ROUNDED * (top - bottom);
-            low < -least && high > least
-        };
         let active = problem.active_after(number + 1);
         let wet = |solid: &&Solid| active[solid.group] && problem.groups[solid.group].pore_water;
         let own = mesh.solids.iter().filter(wet);
-        let cut = own.filter(|solid| is_cut(solid, level) || is_cut(solid, next));
+        let cut = own.filter(|solid| is_cut(mesh, solid, level) || is_cut(mesh, solid, next));
         let cut: Vec<&Solid> = cut.collect();
         if let Some(first) = cut.first() {
             let corners = first.corners();
@@ -347,11 +349,10 @@ fn beside_undrained(problem: &Problem) -> Vec<String> {
     found.iter().map(say).collect()
 }
 
-/// Elements of a thin layer that lie upon one another, or do not agree on what is across it.
-fn stacked(mesh: &Mesh, group: &Group) -> Option<String> {
-    // Of every edge inside the layer, by its middle: for how many of its elements it is a face of
-    // the layer, and how many elements there are.
-    let mut edges: HashMap<usize, (usize, usize)> = HashMap::new();
+/// Of every edge inside a thin layer, by its middle: for how many of its elements it is a face of the layer, and how
+/// many elements there are.
+fn edges_in_layer(mesh: &Mesh, group: &Group) -> HashMap<usize, (usize, usize)> {
+    let mut edges = HashMap::<usize, (usize, usize)>::new();
     for element in 0..group.kinematics.n_elements() {
         let nodes = group.kinematics.nodes(element);
         let along = group.kinematics.axes(element).along;
@@ -371,6 +372,12 @@ fn stacked(mesh: &Mesh, group: &Group) -> Option<String> {
             entry.1 += 1;
         }
     }
+    edges
+}
+
+/// Elements of a thin layer that lie upon one another, or do not agree on what is across it.
+fn stacked(mesh: &Mesh, group: &Group) -> Option<String> {
+    let edges = edges_in_layer(mesh, group);
     let between = |faces: usize| {
         let found = edges.iter().filter(|(_, (f, n))| *n == 2 && *f == faces);
         let mut nodes: Vec<usize> = found.map(|(&node, _)| node).collect();

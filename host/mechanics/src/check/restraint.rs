@@ -1,5 +1,6 @@
 //! Restraint: the parts of a mesh that move as one, and whether supports hold them.
 
+use crate::joined::Joined;
 use crate::mesh::Mesh;
 use std::collections::HashSet;
 
@@ -27,29 +28,19 @@ pub(super) enum Motion {
 /// The parts of a mesh, in the order of their first nodes, of groups that are active. Faces of interfaces
 /// that are not are one.
 pub(super) fn parts(mesh: &Mesh, is_active: &dyn Fn(usize) -> bool) -> Vec<Part> {
-    let mut root: Vec<usize> = (0..mesh.nodes.len()).collect();
-    let mut join = |nodes: &mut dyn Iterator<Item = usize>| {
-        let Some(first) = nodes.next() else { return };
-        let mut top = find(&mut root, first);
-        for node in nodes {
-            let other = find(&mut root, node);
-            // The smaller number stays, so that parts are found in the order of their nodes.
-            root[top.max(other)] = top.min(other);
-            top = top.min(other);
-        }
-    };
+    let mut joined = Joined::new(mesh.nodes.len());
     let mut is_used = vec![false; mesh.nodes.len()];
     for solid in mesh.solids.iter().filter(|solid| is_active(solid.group)) {
-        join(&mut solid.nodes().iter().copied());
+        joined.join(solid.nodes().iter().copied());
         solid.nodes().iter().for_each(|&node| is_used[node] = true);
     }
     for joint in &mesh.joints {
-        join(&mut joint.minus.into_iter().chain(joint.plus));
+        joined.join(joint.minus.into_iter().chain(joint.plus));
     }
     let mut number = vec![usize::MAX; mesh.nodes.len()];
     let mut parts: Vec<Part> = Vec::new();
     for node in (0..mesh.nodes.len()).filter(|&node| is_used[node]) {
-        let top = find(&mut root, node);
+        let top = joined.root(node);
         if number[top] == usize::MAX {
             number[top] = parts.len();
             parts.push(Part {
@@ -61,17 +52,12 @@ pub(super) fn parts(mesh: &Mesh, is_active: &dyn Fn(usize) -> bool) -> Vec<Part>
         parts[number[top]].nodes.push(node);
     }
     let mut seen = HashSet::new();
-    let solids = mesh
-        .solids
-        .iter()
-        .map(|solid| (solid.nodes()[0], solid.group));
-    let joints = mesh
-        .joints
-        .iter()
-        .map(|joint| (joint.minus[0], joint.group));
+    let (solids, joints) = (mesh.solids.iter(), mesh.joints.iter());
+    let solids = solids.map(|solid| (solid.nodes()[0], solid.group));
+    let joints = joints.map(|joint| (joint.minus[0], joint.group));
     let joints = joints.filter(|&(node, _)| is_used[node]);
     for (node, group) in solids.chain(joints).filter(|(_, group)| is_active(*group)) {
-        let part = number[find(&mut root, node)];
+        let part = number[joined.root(node)];
         if seen.insert((part, group)) {
             parts[part].groups.push(group);
         }
@@ -85,14 +71,6 @@ pub(super) fn parts(mesh: &Mesh, is_active: &dyn Fn(usize) -> bool) -> Vec<Part>
         });
     }
     parts
-}
-
-fn find(root: &mut [usize], mut node: usize) -> usize {
-    while root[node] != node {
-        root[node] = root[root[node]];
-        node = root[node];
-    }
-    node
 }
 
 /// The first motion of a part as a rigid body that nothing resists, in the plane or about an axis

@@ -105,6 +105,18 @@ const STRAIGHT: f64 = 1e-12;
 /// Tractions that differ by less, as a part of the element's largest, are the same.
 const SAME: f64 = 1e-12;
 
+/// Places and weights of integration points along an element.
+fn rule(integration: Integration, reaches_axis: bool) -> (&'static [f64], &'static [f64]) {
+    match integration {
+        Integration::Full => gauss(3),
+        Integration::Reduced => gauss(2),
+        // A node on the axis stands for no area: nothing would hold its two sides together.
+        _ if reaches_axis => gauss(3),
+        // Simpson's rule.
+        _ => (&[-1.0, 1.0, 0.0], &[1.0 / 3.0, 1.0 / 3.0, 4.0 / 3.0]),
+    }
+}
+
 impl Joint6 {
     /// Elements with Gauss points, or with the nodes as points; those that reach the axis of symmetry have
     /// three Gauss points instead of the nodes.
@@ -114,17 +126,6 @@ impl Joint6 {
         joints: &[Joint],
         integration: Integration,
     ) -> Self {
-        type Rule = (&'static [f64], &'static [f64]);
-        let rule = |reaches_axis: bool| -> Rule {
-            match integration {
-                Integration::Full => gauss(3),
-                Integration::Reduced => gauss(2),
-                // A node on the axis stands for no area: nothing would hold its two sides together.
-                _ if reaches_axis => gauss(3),
-                // Simpson's rule.
-                _ => (&[-1.0, 1.0, 0.0], &[1.0 / 3.0, 1.0 / 3.0, 4.0 / 3.0]),
-            }
-        };
         let mut points = Vec::new();
         let mut axes = Vec::new();
         let mut lengths = Vec::new();
@@ -137,7 +138,7 @@ impl Joint6 {
             lengths.push(chord_length);
             let reaches_axis = analysis == Analysis::Axisymmetric
                 && start[0].min(end[0]) <= ON_AXIS * chord_length;
-            let (xi, weights) = rule(reaches_axis);
+            let (xi, weights) = rule(integration, reaches_axis);
             let of_rule = xi.iter().zip(weights);
             let own = of_rule.map(|(&xi, &weight)| side.point(analysis, xi, weight));
             let mut own: Vec<Point> = own.collect();
@@ -158,7 +159,7 @@ impl Joint6 {
             nodes,
             axes,
             lengths,
-            points_per_element: rule(false).0.len(),
+            points_per_element: rule(integration, false).0.len(),
             points,
             inexact,
             analysis,

@@ -21,6 +21,7 @@
 //! functions ξᵃηᵇ to match, and a linear volume strain.
 
 use super::Axes;
+use super::reference::RulePoint;
 use super::solid::Point;
 
 /// With a pivot below this the points of an element do not distinguish functions of size 1.
@@ -215,4 +216,18 @@ pub(super) fn linear_volume_stiffness<const N: usize>(
             }
         }
     }
+}
+
+/// At each point of a rule the functions that strains are projected on: linear in the coordinates, and beyond.
+pub(super) fn basis<const N: usize, F: IntoIterator<Item = f64>>(
+    rule: &[RulePoint],
+    points: &[Point<N>],
+    beyond_linear: impl Fn([f64; 2]) -> F,
+) -> Vec<Vec<f64>> {
+    let both = rule.iter().zip(points);
+    both.map(|(at, point)| {
+        let linear = [1.0, point.position[0], point.position[1]];
+        linear.into_iter().chain(beyond_linear(at.at)).collect()
+    })
+    .collect()
 }

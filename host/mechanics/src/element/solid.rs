@@ -91,18 +91,22 @@ impl<const N: usize> Solid<N> {
             axes,
             points,
         } = elements;
-        let nodes: Vec<[usize; N]> = nodes
-            .iter()
-            .map(|nodes| std::array::from_fn(|i| nodes[i]))
-            .collect();
+        let nodes = nodes.iter();
+        let nodes = nodes.map(|nodes| std::array::from_fn(|i| nodes[i]));
+        let nodes: Vec<[usize; N]> = nodes.collect();
         let first = (!nodes.is_empty()).then(|| points(0));
         let points_per_element = first.map_or(0, |first| (reference.rule)(first.along).len());
         let strains = first.map(|first| first.strains);
         let geometry = |element: usize| -> Result<Geometry<N>, BadShape> {
             let places = nodes[element].map(|n| coordinates[n]);
-            let (axes, points) = (&axes[element], points(element));
-            let geometry = Geometry::new(reference, analysis, &places, axes, points);
-            geometry.ok_or(BadShape { element })
+            Geometry::new(
+                reference,
+                analysis,
+                &places,
+                &axes[element],
+                points(element),
+            )
+            .ok_or(BadShape { element })
         };
         let elements: Vec<usize> = (0..nodes.len()).collect();
         let pieces = threads::map(elements.chunks(PIECE), |elements| {
@@ -167,8 +171,8 @@ impl<const N: usize> Geometry<N> {
             points.iter().map(point).collect()
         };
         let is_projected = matches!(strains, Strains::Projected | Strains::ProjectedLinearVolume);
-        let curved = is_projected && reference.is_curved(places);
-        let exact = if curved {
+        let is_curved = is_projected && reference.is_curved(places);
+        let exact = if is_curved {
             (reference.exact_curved)()
         } else {
             (reference.exact)()
@@ -179,27 +183,19 @@ impl<const N: usize> Geometry<N> {
         } else {
             at(&rule)?
         };
-        match strains {
-            Strains::AtPoints | Strains::LinearVolume => {}
-            _ if curved => {
-                let functions = reference.functions.as_ref()?;
-                let basis = |rule: &[RulePoint], points: &[Point<N>]| -> Vec<Vec<f64>> {
-                    let both = rule.iter().zip(points);
-                    both.map(|(at, point)| {
-                        let linear = [1.0, point.position[0], point.position[1]];
-                        let beyond = (functions.beyond_linear)(along, at.at);
-                        linear.into_iter().chain(beyond).collect()
-                    })
-                    .collect()
+        if is_projected {
+            let functions = reference.functions.as_ref()?;
+            if is_curved {
+                let basis = |rule: &[RulePoint], points: &[Point<N>]| {
+                    let beyond_linear = |at| (functions.beyond_linear)(along, at);
+                    projection::basis(rule, points, beyond_linear)
                 };
                 let (at_own, at_fine) = (basis(&rule, &own), basis(&exact, &fine));
                 let values = projection::cardinal(&at_own, &at_fine)?;
                 projection::project(&mut own, &fine, |q, fine| values[fine][q])?;
-            }
-            _ => {
-                let functions = reference.functions.as_ref()?;
-                let of_point = |q: usize, at: [f64; 2]| (functions.function)(rule[q].at, at);
-                let value = |q: usize, fine: usize| of_point(q, exact[fine].at);
+            } else {
+                let value =
+                    |q: usize, fine: usize| (functions.function)(rule[q].at, exact[fine].at);
                 projection::project(&mut own, &fine, value)?;
             }
         }
@@ -573,25 +569,31 @@ impl<const N: usize> Solid<N> {
                 }
             }
             let rows = &mut out[4 * N * i..4 * N * (i + 1)];
-            if *axes == Axes::GLOBAL {
-                for j in 0..N {
-                    for c in 0..2 {
-                        rows[2 * j + c] = k[0][c][j];
-                        rows[2 * N + 2 * j + c] = k[1][c][j];
-                    }
-                }
-            } else {
-                // Rᵀ k R, with the axes as rows of R.
-                let r = [axes.along, axes.across];
-                for j in 0..N {
-                    for c in 0..2 {
-                        for e in 0..2 {
-                            rows[2 * N * c + 2 * j + e] = (0..2)
-                                .map(|p| r[p][c] * (k[p][0][j] * r[0][e] + k[p][1][j] * r[1][e]))
-                                .sum();
-                        }
-                    }
-                }
+            write_rows(&k, axes, rows);
+        }
+    }
+}
+
+/// The rows of a node in an element's stiffness, from those along the element's axes.
+#[inline(always)]
+fn write_rows<const N: usize>(k: &[[[f64; N]; 2]; 2], axes: &Axes, rows: &mut [f64]) {
+    if *axes == Axes::GLOBAL {
+        for j in 0..N {
+            for c in 0..2 {
+                rows[2 * j + c] = k[0][c][j];
+                rows[2 * N + 2 * j + c] = k[1][c][j];
+            }
+        }
+        return;
+    }
+    // Rᵀ k R, with the axes as rows of R.
+    let r = [axes.along, axes.across];
+    for j in 0..N {
+        for c in 0..2 {
+            for e in 0..2 {
+                rows[2 * N * c + 2 * j + e] = (0..2)
+                    .map(|p| r[p][c] * (k[p][0][j] * r[0][e] + k[p][1][j] * r[1][e]))
+                    .sum();
             }
         }
     }

@@ -276,6 +276,27 @@ impl Loading {
                 sides.remove(&joint.plus[2]);
             }
         }
+        self.take_supported(problem, &mut sides);
+        let mut outline: Vec<(usize, usize)> = sides
+            .into_values()
+            .filter_map(|(count, edge)| (count == 1).then_some(edge))
+            .collect();
+        outline.sort_unstable();
+        for edge in outline {
+            let mut nodes = mesh.edge(edge).into_iter();
+            if nodes.all(|node| water.pressure(mesh.nodes[node]) <= 0.0) {
+                continue;
+            }
+            let surface = std::iter::once(|at: [f64; 2]| at[1] - water.level.at(at[0]));
+            let pressure =
+                |at: [f64; 2], inward: [f64; 2]| inward.map(|part| part * water.pressure(at));
+            over_edge(mesh, problem.analysis, edge, surface, force, pressure);
+        }
+    }
+
+    /// Takes from the sides of elements, by their middles, those that supports hold.
+    fn take_supported<S>(&self, problem: &Problem, sides: &mut HashMap<usize, S>) {
+        let mesh = &problem.mesh;
         let lines = self.freed.iter();
         let freed = lines.flat_map(|(line, freed)| {
             let nodes = mesh.lines.get(line).into_iter().flat_map(|l| &l.nodes);
@@ -297,29 +318,6 @@ impl Loading {
                     sides.remove(&middle);
                 }
             }
-        }
-        let mut outline: Vec<(usize, usize)> = sides
-            .into_values()
-            .filter_map(|(count, edge)| (count == 1).then_some(edge))
-            .collect();
-        outline.sort_unstable();
-        for edge in outline {
-            if mesh
-                .edge(edge)
-                .iter()
-                .all(|&node| water.pressure(mesh.nodes[node]) <= 0.0)
-            {
-                continue;
-            }
-            let surface = std::iter::once(|at: [f64; 2]| at[1] - water.level.at(at[0]));
-            over_edge(
-                mesh,
-                problem.analysis,
-                edge,
-                surface,
-                force,
-                |at, inward| inward.map(|part| part * water.pressure(at)),
-            );
         }
     }
 }

@@ -394,25 +394,13 @@ impl Group {
                     .map(|(point, why)| (points.start + point, why)),
             })
         };
-        let mut rest = [flux_end, end.state, end.operator];
-        let mut work = Vec::new();
-        let mut done = 0;
-        for (points, law) in self.pieces(BATCH).into_iter().flat_map(|p| runs(p, wanted)) {
-            let n_operator = if rest[2].is_empty() { 0 } else { n * n };
-            let strides = [end_place.point, n_states, n_operator];
-            let passed = strides.map(|stride| (points.start - done) * stride);
-            let sizes = strides.map(|stride| points.len() * stride);
-            done = points.end;
-            let [flux, states, operators] = rest;
-            let flux = &mut flux[passed[0]..];
-            let states = &mut states[passed[1]..];
-            let operators = &mut operators[passed[2]..];
-            let (flux, flux_left) = flux.split_at_mut(sizes[0]);
-            let (states, states_left) = states.split_at_mut(sizes[1]);
-            let (operators, operators_left) = operators.split_at_mut(sizes[2]);
-            rest = [flux_left, states_left, operators_left];
-            work.push((points, law, [flux, states, operators]));
-        }
+        let pieces = self.pieces(BATCH).into_iter();
+        let n_operator = if end.operator.is_empty() { 0 } else { n * n };
+        let work = batches(
+            pieces.flat_map(|piece| runs(piece, wanted)),
+            [flux_end, end.state, end.operator],
+            [end_place.point, n_states, n_operator],
+        );
         let outcomes: Vec<_> = if self.kinematics.n_points() <= BATCH {
             work.into_iter().map(batch).collect()
         } else {
@@ -497,6 +485,26 @@ impl Group {
         let own = runs.find(|(points, _)| points.contains(&point));
         own.map_or(&self.law.built.law, |(_, number)| &varying.law(*number).law)
     }
+}
+
+/// Runs of points with their parts of these arrays, which have such strides by point.
+fn batches<'a>(
+    runs: impl Iterator<Item = (Range<usize>, &'a Law)>,
+    mut rest: [&'a mut [f64]; 3],
+    strides: [usize; 3],
+) -> Vec<Batch<'a>> {
+    let mut done = 0;
+    let batch = |(points, law): (Range<usize>, &'a Law)| {
+        let passed = points.start - done;
+        done = points.end;
+        let mut own = [&mut [][..], &mut [], &mut []];
+        for ((own, rest), stride) in own.iter_mut().zip(&mut rest).zip(strides) {
+            let left = &mut std::mem::take(rest)[passed * stride..];
+            (*own, *rest) = left.split_at_mut(points.len() * stride);
+        }
+        (points, law, own)
+    };
+    runs.map(batch).collect()
 }
 
 /// Consecutive points of a piece that are wanted.

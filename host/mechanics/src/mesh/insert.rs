@@ -189,8 +189,14 @@ impl Mesh {
                 group: along[joint.interface].group,
             });
         }
+        self.add_copies(&split.original);
+        Ok(())
+    }
+
+    /// Adds nodes that are copies of others to the lines of these. `original`: which node each one was.
+    fn add_copies(&mut self, original: &[usize]) {
         let mut copies: HashMap<usize, Vec<usize>> = HashMap::new();
-        let copied = split.original.iter().enumerate();
+        let copied = original.iter().enumerate();
         for (node, &original) in copied.filter(|&(node, &original)| node != original) {
             copies.entry(original).or_default().push(node);
         }
@@ -201,7 +207,6 @@ impl Mesh {
                 .flat_map(|&node| std::iter::once(node).chain(of(node)))
                 .collect();
         }
-        Ok(())
     }
 
     /// Edges of a line, each once: ends and middle, as the first element that has it goes round.

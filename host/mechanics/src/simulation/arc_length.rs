@@ -3,7 +3,7 @@
 
 use super::steps::{EASY, Progress};
 use super::until::Verdict;
-use super::{Simulation, UnderWay, Warning, Watch, When, go_on, stopped};
+use super::{Simulation, State, UnderWay, Warning, Watch, When, go_on, stopped};
 use crate::equilibrium::{Guess, Measure, Newton, Reason, StepFailure, StepSuccess};
 use crate::error::{Error, Place};
 use crate::settings::{Control, Method, Settings};
@@ -32,7 +32,13 @@ pub(super) enum PathEnd {
 }
 
 /// A path on its way.
-struct Course {
+struct Course<'p> {
+    place: &'p Place,
+    /// Increments of the phase, and the load factor that is sought.
+    n: f64,
+    target: f64,
+    /// Load factor where it starts.
+    start: f64,
     /// Distance of the next step, and that of a whole increment of the load.
     distance: f64,
     whole: f64,
@@ -43,116 +49,123 @@ struct Course {
     steps: usize,
 }
 
+impl Course<'_> {
+    fn between(&self) -> [f64; 2] {
+        [self.lowest, self.highest]
+    }
+
+    /// It ends without equilibrium.
+    fn stops(&self, failure: impl Into<StepFailure>) -> PathEnd {
+        PathEnd::Stopped(Box::new(failure.into()), self.highest)
+    }
+}
+
 impl Simulation {
-    /// Follows the path of equilibrium until the load factor reaches `target` from below, in
-    /// increments of 1/`n`.
+    /// Follows the path of equilibrium until the load factor reaches the second number of `goal` from below, in as
+    /// many increments of the phase as the first one.
     ///
     /// # Errors
     /// The observer stopped the run, or the linear groups are not in equilibrium.
     pub(super) fn follow_path(
         &mut self,
         place: &Place,
-        [n, target]: [f64; 2],
+        goal: [f64; 2],
         phase: &mut UnderWay,
         watch: &mut dyn Watch,
         done: &mut Progress,
     ) -> Result<PathEnd, Error> {
-        let start = phase.course.lambda;
-        let Some(mut course) = self.set_out(phase, n) else {
+        let Some(mut course) = self.set_out(phase, place, goal) else {
             let reason = Reason::NothingDeforms { any_more: false };
-            return Ok(PathEnd::Stopped(Box::new(reason.into()), start));
+            let highest = phase.course.lambda;
+            return Ok(PathEnd::Stopped(Box::new(reason.into()), highest));
         };
         for _ in 0..MAX_STEPS {
-            let from = phase.course.lambda;
             let before = self.before_step(phase);
-            let mut step = self.advance(phase, course.distance);
-            if let Ok((beyond, lambda)) = &step
-                && *lambda >= target
-            {
-                // Onto the target itself, by the load.
-                done.iterations += beyond.iterations.len();
-                let ratio = (target - from) / (lambda - from);
-                let guess = Guess {
-                    increment: beyond.increment.iter().map(|u| ratio * u).collect(),
-                    contraction: None,
-                    was_motion: false,
-                };
-                let onto = self.attempt(
-                    phase,
-                    (Control::ArcLength, false),
-                    [from, target],
-                    Some(guess),
-                );
-                step = onto.map(|success| (success, target));
-            }
-            match step {
-                Ok((_, lambda)) if lambda < -BACK => {
-                    let reason = Reason::RanBack {
-                        steps: course.steps,
-                        highest: course.highest,
-                        to: lambda,
-                    };
-                    return Ok(PathEnd::Stopped(Box::new(reason.into()), course.highest));
-                }
-                Ok((success, lambda)) => {
-                    let most = self.problem.settings.max_iterations() as f64;
-                    let is_easy = success.iterations.len() as f64 <= EASY * most;
-                    self.take_over(success, lambda, place, phase, watch, done)?;
-                    phase.record.arc_length += 1;
-                    match self.look_after_step(place, phase, before, watch)? {
-                        Verdict::GoesOn => {}
-                        Verdict::Ends => return Ok(PathEnd::Reached),
-                        Verdict::Again(part) => {
-                            course.distance *= part;
-                            continue;
-                        }
-                    }
-                    course.steps += 1;
-                    if lambda >= target {
-                        // Not so short that the next increment starts with next to nothing.
-                        phase.course.step = (target - from).clamp(FIRST / n, 1.0 / n);
-                        watch.warning(&Warning::FollowedPath {
-                            place: place.clone(),
-                            start,
-                            between: [course.lowest, course.highest],
-                        });
-                        return Ok(PathEnd::Reached);
-                    }
-                    course.highest = course.highest.max(lambda);
-                    course.lowest = course.lowest.min(lambda);
-                    if is_easy {
-                        course.distance = (GROWTH * course.distance).min(course.whole);
-                    }
-                }
-                Err(failure) if failure.is_stop() => return Err(stopped(place)),
-                Err(failure) => {
-                    go_on(watch.iterations(place, from, &failure.iterations))?;
-                    done.iterations += failure.iterations.len();
-                    phase.record.cut_backs += 1;
-                    course.distance *= 0.5;
-                    go_on(watch.cut_back(place, from, course.distance, &failure.reason))?;
-                    let smallest = FIRST * course.whole * f64::powi(2.0, -HALVINGS);
-                    if failure.defect().is_some() {
-                        return Ok(PathEnd::Stopped(Box::new(failure), course.highest));
-                    }
-                    if course.distance < smallest {
-                        let reason = Reason::Followed {
-                            end: Box::new(failure.reason),
-                            start,
-                            between: [course.lowest, course.highest],
-                        };
-                        let failure = StepFailure { reason, ..failure };
-                        return Ok(PathEnd::Stopped(Box::new(failure), course.highest));
-                    }
-                }
+            let end = match self.advance_to_target(phase, &course, done) {
+                Ok((_, lambda)) if lambda < -BACK => Some(course.stops(Reason::RanBack {
+                    steps: course.steps,
+                    highest: course.highest,
+                    to: lambda,
+                })),
+                Ok(step) => self.take_path_step(step, before, &mut course, phase, watch, done)?,
+                Err(failure) => shorten(failure, &mut course, phase, watch, done)?,
+            };
+            if let Some(end) = end {
+                return Ok(end);
             }
         }
-        let reason = Reason::LoadDoesNotRise {
+        Ok(course.stops(Reason::LoadDoesNotRise {
             steps: MAX_STEPS,
-            between: [course.lowest, course.highest],
+            between: course.between(),
             at: phase.course.lambda,
+        }))
+    }
+
+    /// One step along the path, or onto the target itself where that is nearer. Returns its load factor too.
+    fn advance_to_target(
+        &mut self,
+        phase: &mut UnderWay,
+        course: &Course<'_>,
+        done: &mut Progress,
+    ) -> Result<(StepSuccess, f64), StepFailure> {
+        let (from, target) = (phase.course.lambda, course.target);
+        let (beyond, lambda) = self.advance(phase, course.distance)?;
+        if lambda < target {
+            return Ok((beyond, lambda));
+        }
+        done.iterations += beyond.iterations.len();
+        let ratio = (target - from) / (lambda - from);
+        let guess = Guess {
+            increment: beyond.increment.iter().map(|u| ratio * u).collect(),
+            contraction: None,
+            was_motion: false,
         };
-        Ok(PathEnd::Stopped(Box::new(reason.into()), course.highest))
+        let way = (Control::ArcLength, false);
+        let onto = self.attempt(phase, way, [from, target], Some(guess));
+        onto.map(|success| (success, target))
+    }
+
+    /// Takes over a step along the path. Returns the end of the path if it is there.
+    fn take_path_step(
+        &mut self,
+        (success, lambda): (StepSuccess, f64),
+        before: Option<State<'static>>,
+        course: &mut Course<'_>,
+        phase: &mut UnderWay,
+        watch: &mut dyn Watch,
+        done: &mut Progress,
+    ) -> Result<Option<PathEnd>, Error> {
+        let (place, from) = (course.place, phase.course.lambda);
+        let most = self.problem.settings.max_iterations() as f64;
+        let is_easy = success.iterations.len() as f64 <= EASY * most;
+        self.take_over(success, lambda, place, phase, watch, done)?;
+        phase.record.arc_length += 1;
+        match self.look_after_step(place, phase, before, watch)? {
+            Verdict::GoesOn => {}
+            Verdict::Ends => return Ok(Some(PathEnd::Reached)),
+            Verdict::Again(part) => {
+                course.distance *= part;
+                return Ok(None);
+            }
+        }
+        course.steps += 1;
+        if lambda >= course.target {
+            // Not so short that the next increment starts with next to nothing.
+            let n = course.n;
+            phase.course.step = (course.target - from).clamp(FIRST / n, 1.0 / n);
+            watch.warning(&Warning::FollowedPath {
+                place: place.clone(),
+                from: course.start,
+                range: course.between(),
+            });
+            return Ok(Some(PathEnd::Reached));
+        }
+        course.highest = course.highest.max(lambda);
+        course.lowest = course.lowest.min(lambda);
+        if is_easy {
+            course.distance = (GROWTH * course.distance).min(course.whole);
+        }
+        Ok(None)
     }
 
     /// A step by the load under arc-length control, unless it has leapt over a piece of the path. In a leap the points
@@ -184,15 +197,25 @@ impl Simulation {
     }
 
     /// A path from where the phase stands.
-    fn set_out(&self, phase: &UnderWay, n: f64) -> Option<Course> {
+    fn set_out<'p>(
+        &self,
+        phase: &UnderWay,
+        place: &'p Place,
+        [n, target]: [f64; 2],
+    ) -> Option<Course<'p>> {
         let (length, increment) = phase.course.history.latest()?;
         let measure = Measure::new(&self.groups, &phase.equations.places, increment)?;
         let whole = measure.of(increment) / (n * length).abs();
+        let start = phase.course.lambda;
         Some(Course {
+            place,
+            n,
+            target,
+            start,
             distance: FIRST * whole,
             whole,
-            lowest: phase.course.lambda,
-            highest: phase.course.lambda,
+            lowest: start,
+            highest: start,
             steps: 0,
         })
     }
@@ -248,4 +271,36 @@ impl Simulation {
             .map_err(|reason| self.incomplete(phase, place, lambda, reason))?;
         go_on(watch.step(place, lambda, iterations, &self.snapshot()))
     }
+}
+
+/// Halves the distance after a step without equilibrium. Returns the end of the path if it is too short then.
+fn shorten(
+    failure: StepFailure,
+    course: &mut Course<'_>,
+    phase: &mut UnderWay,
+    watch: &mut dyn Watch,
+    done: &mut Progress,
+) -> Result<Option<PathEnd>, Error> {
+    let (place, from) = (course.place, phase.course.lambda);
+    if failure.is_stop() {
+        return Err(stopped(place));
+    }
+    go_on(watch.iterations(place, from, &failure.iterations))?;
+    done.iterations += failure.iterations.len();
+    phase.record.cut_backs += 1;
+    course.distance *= 0.5;
+    go_on(watch.cut_back(place, from, course.distance, &failure.reason))?;
+    let smallest = FIRST * course.whole * f64::powi(2.0, -HALVINGS);
+    if failure.defect().is_some() {
+        return Ok(Some(course.stops(failure)));
+    }
+    if course.distance >= smallest {
+        return Ok(None);
+    }
+    let reason = Reason::Followed {
+        end: Box::new(failure.reason),
+        start: course.start,
+        between: course.between(),
+    };
+    Ok(Some(course.stops(StepFailure { reason, ..failure })))
 }

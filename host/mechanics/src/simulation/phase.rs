@@ -238,14 +238,14 @@ impl Simulation {
         if left > tolerance {
             watch.warning(&Warning::RoundOff {
                 phase: record.name.clone(),
-                tolerance,
+                asked: tolerance,
                 left,
             });
         }
         if record.unsettled > 0.0 {
             watch.warning(&Warning::Unsettled {
                 phase: record.name.clone(),
-                tolerance: self.problem.settings.displacement_tolerance,
+                asked: self.problem.settings.displacement_tolerance,
                 left: record.unsettled,
             });
         }

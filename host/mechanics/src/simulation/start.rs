@@ -7,7 +7,8 @@ use crate::element::Axes;
 use crate::equilibrium::StepFailure;
 use crate::error::{Error, Place};
 use crate::ground::beside_joints;
-use crate::group::Group;
+use crate::group::{Group, PointFailure};
+use crate::mesh::Solid;
 use crate::model::Model;
 use crate::problem::{Formulation, InitialStress};
 use abi::status::Outcome;
@@ -21,6 +22,10 @@ const WORTH_A_WORD: f64 = 1e-6;
 /// The same for earth pressure at rest: above the law's tolerance, so that it means its strength.
 const OUTSIDE: f64 = 1e-3;
 
+fn cannot_start(failure: PointFailure) -> Error {
+    Error::CannotStart(Box::new(failure))
+}
+
 impl Simulation {
     /// Starts a phase: what is there, its laws and its loads. Returns its prescribed displacements.
     pub(super) fn start(
@@ -30,25 +35,15 @@ impl Simulation {
     ) -> Result<Vec<Prescribed>, Error> {
         let phase = self.problem.phases[number].clone();
         let mut starts = vec![number == 0; self.groups.len()];
-        let moment = Moment {
-            step: number as u32 + 1,
-            increment: 1,
-            step_start: self.time,
-            step_length: phase.length(),
-            is_undrained: false,
-        };
-        let cannot_start = |failure| Error::CannotStart(Box::new(failure));
+        let moment = self.moment(number, 1);
         let start = self.loading[1].clone();
         if !phase.activate.is_empty() {
             // Faces that were one part: each has its own share of what acts on them.
             self.force = start.forces(&self.problem, &self.groups);
         }
         self.loading = [start.clone(), start.changed_by(&phase)];
-        let beside: Vec<[Vec<f64>; 2]> = phase
-            .activate
-            .iter()
-            .map(|&g| self.stress_beside(g))
-            .collect();
+        let activated = phase.activate.iter();
+        let beside: Vec<_> = activated.map(|&group| self.stress_beside(group)).collect();
         self.released.fill(0.0);
         for &group in &phase.deactivate {
             let gone = &self.groups[group];
@@ -59,8 +54,7 @@ impl Simulation {
         for (group, law) in self.swaps[number].clone() {
             starts[group] = true;
             self.groups[group].moment = moment;
-            let parted = self.groups[group].set_law(law).map_err(cannot_start)?;
-            if let Some(parted) = parted {
+            if let Some(parted) = self.groups[group].set_law(law).map_err(cannot_start)? {
                 watch.warning(&Warning::GroupSplit(phase.name.clone(), parted));
             }
         }
@@ -70,26 +64,7 @@ impl Simulation {
             self.groups[group].appear(stress).map_err(cannot_start)?;
             self.groups[group].correct(lost);
         }
-        let of_interfaces =
-            |&group: &usize| self.groups[group].formulation == Formulation::ZeroThickness;
-        let appeared: Vec<usize> = phase
-            .activate
-            .iter()
-            .copied()
-            .filter(of_interfaces)
-            .collect();
-        if number > 0 && !appeared.is_empty() {
-            let lacking = self.lacking(number, &appeared)?;
-            for (&group, lacking) in appeared.iter().zip(lacking) {
-                let beside = self.groups[group].stress.committed.clone();
-                let both = beside.iter().zip(lacking);
-                let stress = both.map(|(beside, lacking)| beside + lacking).collect();
-                // Some laws start from compression only: then the means are nearer to what they can carry.
-                if self.groups[group].appear(stress).is_err() {
-                    self.groups[group].appear(beside).map_err(cannot_start)?;
-                }
-            }
-        }
+        self.add_lacking(number, &phase.activate)?;
         Model::check_layers(&self.groups)?;
         for group in (0..self.groups.len()).filter(|&group| starts[group]) {
             self.groups[group].moment = moment;
@@ -136,6 +111,27 @@ impl Simulation {
         Ok(())
     }
 
+    /// Adds to the stress of interfaces that appear what the forces on the faces lack.
+    fn add_lacking(&mut self, number: usize, activated: &[usize]) -> Result<(), Error> {
+        let is_interface =
+            |&group: &usize| self.groups[group].formulation == Formulation::ZeroThickness;
+        let appeared: Vec<usize> = activated.iter().copied().filter(is_interface).collect();
+        if number == 0 || appeared.is_empty() {
+            return Ok(());
+        }
+        let lacking = self.lacking(number, &appeared)?;
+        for (&group, lacking) in appeared.iter().zip(lacking) {
+            let beside = self.groups[group].stress.committed.clone();
+            let both = beside.iter().zip(lacking);
+            let stress = both.map(|(beside, lacking)| beside + lacking).collect();
+            // Some laws start from compression only: then the means are nearer to what they can carry.
+            if self.groups[group].appear(stress).is_err() {
+                self.groups[group].appear(beside).map_err(cannot_start)?;
+            }
+        }
+        Ok(())
+    }
+
     /// Stress with which a group appears: none in solids; in interfaces that computed next to them, in
     /// axes of the elements, and what exact integration adds to it. Water between the faces carries its own pressure.
     fn stress_beside(&self, number: usize) -> [Vec<f64>; 2] {
@@ -148,13 +144,11 @@ impl Simulation {
         let solids = &self.problem.mesh.solids;
         // Number of each solid within its group.
         let mut counts = vec![0; self.groups.len()];
-        let within: Vec<usize> = solids
-            .iter()
-            .map(|solid| {
-                counts[solid.group] += 1;
-                counts[solid.group] - 1
-            })
-            .collect();
+        let number_within = |solid: &Solid| {
+            counts[solid.group] += 1;
+            counts[solid.group] - 1
+        };
+        let within: Vec<usize> = solids.iter().map(number_within).collect();
         let beside = beside_joints(&self.problem.mesh);
         let water = self.loading[0].water(&self.problem);
         let traction = |element: usize, at: [f64; 2], axes: &Axes| {
@@ -169,16 +163,12 @@ impl Simulation {
                 let inside = self.problem.mesh.towards_middle(&solids[solid], at, INSIDE);
                 let mut total = self.groups[group].carried_at(within[solid], inside);
                 if self.problem.groups[group].pore_water {
-                    total[..3]
-                        .iter_mut()
-                        .for_each(|component| *component -= pressure);
+                    (0..3).for_each(|component| total[component] -= pressure);
                 }
                 Some(total)
             };
-            let sides: Vec<[f64; 4]> = [nodes[2], nodes[5]]
-                .into_iter()
-                .filter_map(of_side)
-                .collect();
+            let faces = [nodes[2], nodes[5]].into_iter();
+            let sides: Vec<[f64; 4]> = faces.filter_map(of_side).collect();
             let share = 1.0 / sides.len().max(1) as f64;
             let mean =
                 std::array::from_fn(|c| share * sides.iter().map(|side| side[c]).sum::<f64>());
@@ -190,11 +180,8 @@ impl Simulation {
         };
         let at_point = |point: usize| {
             let (element, _) = kinematics.place_of(point);
-            traction(
-                element,
-                kinematics.position(point),
-                &kinematics.axes_at(point),
-            )
+            let (at, axes) = (kinematics.position(point), kinematics.axes_at(point));
+            traction(element, at, &axes)
         };
         let stress: Vec<f64> = (0..n).flat_map(at_point).collect();
         let lost = group.lost(&stress, traction);

@@ -169,7 +169,7 @@ impl Simulation {
             watch.warning(&Warning::NotReached {
                 phase,
                 until,
-                value,
+                last: value,
             });
         } else if phase.course.increment > 0 {
             watch.reached(&self.reached(phase, until, value));

@@ -42,14 +42,14 @@ pub enum Warning {
         /// What was asked for.
         until: Until,
         /// The last value; NaN where there is none.
-        value: f64,
+        last: f64,
     },
     /// The tolerance of the residual is below round-off.
     RoundOff {
         /// The phase.
         phase: String,
         /// What was asked for.
-        tolerance: f64,
+        asked: f64,
         /// The rest.
         left: f64,
     },
@@ -58,7 +58,7 @@ pub enum Warning {
         /// The phase.
         phase: String,
         /// What was asked for.
-        tolerance: f64,
+        asked: f64,
         /// The largest last correction, relative to its increment.
         left: f64,
     },
@@ -136,9 +136,9 @@ pub enum Warning {
         /// The increment.
         place: Place,
         /// Load factor of the phase from which the load could not simply rise.
-        start: f64,
+        from: f64,
         /// Lowest and highest load factor on the path.
-        between: [f64; 2],
+        range: [f64; 2],
     },
     /// A bond that the first tension breaks began without normal stress, and has opened.
     BrokenBond(Place, BrokenBond),
@@ -150,6 +150,17 @@ impl Warning {
         matches!(self, Self::Approximate(_))
     }
 }
+
+const APPROXIMATE: &str =
+    "declares its tangents approximate: differences of its stresses replace them";
+const NO_DERIVATIVES: &str = "are not the derivatives of its stresses";
+const NO_TIME: &str = "depends on time: the phase takes 1 unit of time";
+const GRADUALLY: &str = "applied gradually over the phase";
+const UNASKED: &str = "when the law is called with zero strain. Whether it changes the stresses it takes over is \
+                       unknown; any change comes in the first increment";
+const VISCOUS: &str = "Newton iterations stalled; viscous control found the next equilibrium";
+const TURNED_VISCOUS: &str = "even short load steps found no equilibrium; the rest of the increment is computed under \
+                              viscous control";
 
 /// Single corrections are tried.
 const SINGLY: &str = "no other way found an equilibrium; viscous control goes on by single corrections, and bonds that \
@@ -166,43 +177,29 @@ impl fmt::Display for Warning {
             Self::Note(note) => write!(f, "{note}"),
             Self::OutOfBalance(phase, share) => out_of_balance(f, phase, *share),
             Self::BrokenBond(place, torn) => write!(f, "{place}: {torn}"),
-            Self::Approximate(law) => write!(
+            Self::Approximate(law) => write!(f, "law `{law}` {APPROXIMATE}"),
+            Self::NoDerivative { group, law, notice } => {
+                write!(
+                    f,
+                    "group `{group}`: the tangents of law `{law}` {NO_DERIVATIVES}, {notice}"
+                )
+            }
+            Self::NoTime { phase, law, by } => {
+                write!(
+                    f,
+                    "phase `{phase}` has no `time`, and law `{law}`{by} {NO_TIME}"
+                )
+            }
+            Self::NotReached { phase, until, last } => not_reached(f, phase, until, *last),
+            Self::RoundOff { phase, asked, left } => write!(
                 f,
-                "law `{law}` declares its tangents approximate: differences of its stresses replace them"
-            ),
-            Self::NoDerivative { group, law, notice } => write!(
-                f,
-                "group `{group}`: the tangents of law `{law}` are not the derivatives of its stresses, {notice}"
-            ),
-            Self::NoTime { phase, law, by } => write!(
-                f,
-                "phase `{phase}` has no `time`, and law `{law}`{by} depends on time: the phase takes 1 unit of time"
-            ),
-            Self::NotReached {
-                phase,
-                until,
-                value,
-            } => not_reached(f, phase, until, *value),
-            Self::RoundOff {
-                phase,
-                tolerance,
-                left,
-            } => write!(
-                f,
-                "phase `{phase}`: `force_tolerance` {tolerance:.1e} is below round-off: the residual stays at {left:.1e}, the last \
+                "phase `{phase}`: `force_tolerance` {asked:.1e} is below round-off: the residual stays at {left:.1e}, the last \
                  bit of the displacements"
             ),
             Self::Relaxed(place, by_viscous_control) => relaxed(f, place, *by_viscous_control),
             Self::CutBack(place, in_halves) => cut_back(f, place, *in_halves),
-            Self::Unsettled {
-                phase,
-                tolerance,
-                left,
-            } => unsettled(f, phase, [*tolerance, *left]),
-            Self::Viscous(place) => write!(
-                f,
-                "{place}: Newton iterations stalled; viscous control found the next equilibrium. {COMPARE}"
-            ),
+            Self::Unsettled { phase, asked, left } => unsettled(f, phase, [*asked, *left]),
+            Self::Viscous(place) => write!(f, "{place}: {VISCOUS}. {COMPARE}"),
             Self::RelaxedOften {
                 phase,
                 relaxed,
@@ -224,44 +221,38 @@ impl fmt::Display for Warning {
                 tolerance,
             } => tolerated(f, place, [*residual, *force, *tolerance]),
             Self::ByForce { phase, steps, open } => by_force(f, phase, *steps, open),
-            Self::LedTogether {
-                phase,
-                by,
-                at: [x, y],
-            } => write!(
-                f,
-                "phase `{phase}`: nodes that are now tied together, one at ({x:.4}, {y:.4}), had displacements {by:.3e} m apart. The \
-                 prescribed `displacement` removes this difference, which strains the body; `reset_displacements = \
-                 true` in this phase avoids it"
-            ),
+            Self::LedTogether { phase, by, at } => led_together(f, phase, *by, *at),
             Self::Restored(place, change) => write!(f, "{place}: {change}"),
             Self::GroupSplit(phase, parted) => write!(f, "phase `{phase}`: {parted}"),
-            Self::TookOver(phase, change) => write!(
-                f,
-                "phase `{phase}`: {change}, applied gradually over the phase"
-            ),
-            Self::Unasked(phase, reason) => write!(
-                f,
-                "phase `{phase}`: {reason}\n  when the law is called with zero strain. Whether it changes the stresses it takes over is unknown; \
-                 any change comes in the first increment"
-            ),
-            Self::TurnedViscous(place) => write!(
-                f,
-                "{place}: even short load steps found no equilibrium; the rest of the increment is computed under viscous \
-                 control. {COMPARE}"
-            ),
+            Self::TookOver(phase, change) => write!(f, "phase `{phase}`: {change}, {GRADUALLY}"),
+            Self::Unasked(phase, reason) => write!(f, "phase `{phase}`: {reason}\n  {UNASKED}"),
+            Self::TurnedViscous(place) => write!(f, "{place}: {TURNED_VISCOUS}. {COMPARE}"),
             Self::SingleCorrections(place) => write!(f, "{place}: {SINGLY}"),
-            Self::FollowedPath {
-                place,
-                start,
-                between: [lowest, highest],
-            } => write!(
-                f,
-                "{place}: from {start:.4} of the phase on, no equilibrium is near at a higher load; arc length followed the \
-                 path between {lowest:.4} and {highest:.4} (path.csv)"
-            ),
+            Self::FollowedPath { place, from, range } => followed(f, place, *from, *range),
         }
     }
+}
+
+fn led_together(f: &mut fmt::Formatter<'_>, phase: &str, by: f64, [x, y]: [f64; 2]) -> fmt::Result {
+    write!(
+        f,
+        "phase `{phase}`: nodes that are now tied together, one at ({x:.4}, {y:.4}), had displacements {by:.3e} m apart. The \
+         prescribed `displacement` removes this difference, which strains the body; `reset_displacements = \
+         true` in this phase avoids it"
+    )
+}
+
+fn followed(
+    f: &mut fmt::Formatter<'_>,
+    place: &Place,
+    from: f64,
+    [lowest, highest]: [f64; 2],
+) -> fmt::Result {
+    write!(
+        f,
+        "{place}: from {from:.4} of the phase on, no equilibrium is near at a higher load; arc length followed the \
+         path between {lowest:.4} and {highest:.4} (path.csv)"
+    )
 }
 
 fn not_reached(
@@ -432,7 +423,7 @@ mod tests {
         assert!(!within.contains("out of balance"), "{within}");
         let unsettled = Warning::Unsettled {
             phase: "push".to_owned(),
-            tolerance: 1e-7,
+            asked: 1e-7,
             left: 3e-6,
         };
         let said = unsettled.to_string();

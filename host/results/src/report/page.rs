@@ -9,10 +9,11 @@ use super::number_format::display;
 use super::pile::Pile;
 use super::profile::Profile;
 use super::results::{Ending, History, Run};
+use super::{filled, internal};
 use crate::mesh_error::OfPhase;
 use crate::summary::{Figure, Group, Head, Law, Phase, Resistances, Section, Summary};
 use minijinja::value::Serde;
-use minijinja::{Environment, Value as Template, context};
+use minijinja::{Value as Template, context};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -91,16 +92,10 @@ pub(super) enum For {
 
 /// The text of the page, for a file in `folder`.
 pub(super) fn render(runs: &[Run], folder: &Path, kind: For) -> Result<String, Error> {
-    let internal = |why: String| Error::Internal(format!("report: {why}"));
     let drawn: Vec<Drawn<'_>> = runs.iter().zip(figures(runs)).map(drawn).collect();
-    let data = serde_json::to_string(&drawn).map_err(|error| internal(error.to_string()))?;
-    let page = page(runs, folder, kind, &data).map_err(|error| internal(error.to_string()))?;
-    let mut environment = Environment::new();
-    environment
-        .add_template("report.html", TEMPLATE)
-        .and_then(|()| environment.get_template("report.html"))
-        .and_then(|template| template.render(page))
-        .map_err(|error| internal(format!("{error:#}")))
+    let data = serde_json::to_string(&drawn).map_err(internal)?;
+    let page = page(runs, folder, kind, &data).map_err(internal)?;
+    filled(TEMPLATE, page)
 }
 
 fn page(runs: &[Run], folder: &Path, kind: For, data: &str) -> serde_json::Result<Template> {

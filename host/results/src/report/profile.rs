@@ -319,15 +319,8 @@ impl Profile {
 
     /// Excerpt of a table. `None` if that is nothing.
     pub(super) fn of(profiles: Profiles, times: &Times, notes: &mut Vec<String>) -> Option<Self> {
-        let Profiles {
-            columns,
-            phases,
-            points,
-            blocks,
-            most,
-            ..
-        } = profiles;
-        let points = points.filter(|points| !points.is_empty())?;
+        let points = profiles.points.filter(|points| !points.is_empty())?;
+        let (columns, blocks, most) = (profiles.columns, profiles.blocks, profiles.most);
         notes.extend(blocks.incomplete("profile.csv"));
         let size = points.len() * columns.len();
         if size > most {
@@ -355,7 +348,7 @@ impl Profile {
             order.iter().map(value).collect()
         };
         let places = shown.iter().map(|block| {
-            let phase = phases[block.phase].clone();
+            let phase = profiles.phases[block.phase].clone();
             Place {
                 time: Short(times.of(&phase, block.increment)),
                 phase,

@@ -77,6 +77,17 @@ pub(super) struct History {
 pub(super) struct Times(HashMap<String, HashMap<usize, f64>>);
 
 impl Times {
+    /// Phase and increment of every row, and the finite ones of their times.
+    fn new<'p>(rows: impl Iterator<Item = (&'p str, usize)>, times: Option<&[f64]>) -> Self {
+        let mut all = Self::default();
+        for ((phase, increment), &time) in rows.zip(times.unwrap_or_default()) {
+            if time.is_finite() {
+                all.add(phase, increment, time);
+            }
+        }
+        all
+    }
+
     fn add(&mut self, phase: &str, increment: usize, time: f64) {
         if let Some(of_phase) = self.0.get_mut(phase) {
             of_phase.insert(increment, time);
@@ -134,8 +145,8 @@ impl History {
         let [phase, increment, time] = needed.map(|name| table.position(name).unwrap_or_default());
         let all = 0..table.columns().len();
         let columns: Vec<usize> = all.filter(|c| ![phase, increment].contains(c)).collect();
-        let names = columns.iter().map(|&c| table.columns()[c].clone());
-        let names: Vec<String> = names.collect();
+        let name = |&column: &usize| table.columns()[column].clone();
+        let names = columns.iter().map(name).collect();
         let time_at = columns.iter().position(|&column| column == time);
         let mut phases: Vec<String> = Vec::new();
         let mut of_row: Vec<usize> = Vec::new();
@@ -152,16 +163,12 @@ impl History {
             }
         })?;
         let n = of_row.len();
-        let mut times = Times::default();
-        for (row, &time) in time_at.iter().flat_map(|&at| values[at].iter().enumerate()) {
-            if time.is_finite() {
-                times.add(&phases[of_row[row]], increments[row], time);
-            }
-        }
+        let of_rows = of_row.iter().map(|&phase| phases[phase].as_str());
+        let of_rows = of_rows.zip(increments.iter().copied());
+        let times = Times::new(of_rows, time_at.map(|at| &values[at][..]));
         let finite = |value: f64| value.is_finite().then_some(value);
-        let last_rows: Vec<usize> = (0..n)
-            .filter(|&row| of_row.get(row + 1) != Some(&of_row[row]))
-            .collect();
+        let is_last = |&row: &usize| of_row.get(row + 1) != Some(&of_row[row]);
+        let last_rows: Vec<usize> = (0..n).filter(is_last).collect();
         let ends = last_rows.iter().map(|&row| PhaseEnd {
             phase: phases[of_row[row]].clone(),
             increment: increments[row],
@@ -170,10 +177,8 @@ impl History {
         let ends: Vec<PhaseEnd> = ends.collect();
         let shown = shown_rows(&values, n, budget.history_rows(columns.len()), &last_rows);
         notes.extend(left_out(shown.len(), n));
-        let short = |column: &Vec<f64>| -> Vec<Short> {
-            let values = shown.iter().map(|&row| Short(finite(column[row])));
-            values.collect()
-        };
+        let short_at = |column: &[f64], row: usize| Short(finite(column[row]));
+        let short = |column: &Vec<f64>| shown.iter().map(|&row| short_at(column, row)).collect();
         Ok(Self {
             phase: shown.iter().map(|&row| of_row[row]).collect(),
             increment: shown.iter().map(|&row| increments[row]).collect(),

@@ -1,18 +1,18 @@
 //! The report of a study: what its parameters do to what counts, and every curve in the colour of a
 //! parameter.
 
-use super::Known;
 use super::budget::Budget;
 use super::number_format::{Short, display, thinned};
 use super::page::{STYLE, running};
 use super::results::Run;
+use super::{Known, filled, internal};
 use crate::run_table::shown;
 use crate::study::{
     Design, EFFECTS, Effect, History, Output, ParameterRecord, Record, Row, State, Take, effects,
 };
 use crate::table::comma_separated;
 use indexmap::{IndexMap, IndexSet};
-use minijinja::{Environment, Value as Template, context};
+use minijinja::{Value as Template, context};
 use serde::Serialize;
 use std::iter;
 use std::path::Path;
@@ -73,10 +73,23 @@ struct Curve {
     values: Vec<Vec<Short>>,
 }
 
+/// What the parameters do to each output, by its name.
+fn effects_of_all(
+    record: &Record,
+    design: Design,
+    parameters: &[Varied],
+    numbers: &[Vec<Option<f64>>],
+) -> IndexMap<String, Vec<Effect>> {
+    let columns: Vec<Vec<f64>> = parameters.iter().map(|p| p.numbers.clone()).collect();
+    let outputs = record.outputs.iter().zip(numbers);
+    outputs
+        .map(|(output, numbers)| (output.name.clone(), effects(&columns, numbers, design)))
+        .collect()
+}
+
 /// The text of the page of the study in a folder; while it is carried out with the present time, in seconds
 /// since 1970. Its effects go into their table.
 pub(super) fn render(folder: &Path, now: Option<u64>) -> Result<String, Error> {
-    let internal = |why: String| Error::Internal(format!("report: {why}"));
     let record = Record::read(folder)?;
     let rows = record.runs(folder)?;
     let history = |row: &Row| {
@@ -96,14 +109,8 @@ pub(super) fn render(folder: &Path, now: Option<u64>) -> Result<String, Error> {
         .zip(&record.parameters)
         .map(|(number, parameter)| varied(number, parameter, &rows))
         .collect();
-    let columns: Vec<Vec<f64>> = parameters.iter().map(|p| p.numbers.clone()).collect();
     let design = design(&record);
-    let of_output = |(output, numbers): (&'_ Output, &Vec<Option<f64>>)| {
-        let found = effects(&columns, numbers, design);
-        (output.name.clone(), found)
-    };
-    let found: IndexMap<String, Vec<Effect>> =
-        record.outputs.iter().zip(&numbers).map(of_output).collect();
+    let found = effects_of_all(&record, design, &parameters, &numbers);
     replace_whole(&folder.join(EFFECTS), effects_table(&record, &found)?)?;
     let mut units = units(folder, &rows);
     let of = |output: &Output| Some((output.name.clone(), units.get(&output.probe)?.clone()));
@@ -126,15 +133,10 @@ pub(super) fn render(folder: &Path, now: Option<u64>) -> Result<String, Error> {
         history,
         parameters,
     };
-    let data = serde_json::to_string(&drawn).map_err(|error| internal(error.to_string()))?;
+    let data = serde_json::to_string(&drawn).map_err(internal)?;
     let of = (&record, design);
     let page = page(of, &rows, &numbers, &drawn, (left_out, now), &data);
-    let mut environment = Environment::new();
-    environment
-        .add_template("report.html", TEMPLATE)
-        .and_then(|()| environment.get_template("report.html"))
-        .and_then(|template| template.render(page))
-        .map_err(|error| internal(format!("{error:#}")))
+    filled(TEMPLATE, page)
 }
 
 /// Units of the probes, as the first run that can be read has them.
@@ -293,11 +295,10 @@ fn page(
         let of_run: Vec<String> = of_run.collect();
         context! { numbers => of_run, ..run_context(row) }
     };
-    let parameters: Vec<Template> = record
-        .parameters
-        .iter()
+    let parameters = record.parameters.iter();
+    let parameters = parameters
         .map(|p| context! { name => p.name.clone(), keys => p.keys.clone(), spread => p.spread.clone() })
-        .collect();
+        .collect::<Vec<Template>>();
     context! {
         version => env!("CARGO_PKG_VERSION"),
         style => STYLE,

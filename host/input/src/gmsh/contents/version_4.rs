@@ -164,11 +164,8 @@ impl Reader<'_> {
                 }
             };
             let numbers = 1 + kind.n_nodes();
-            let n = cursor.count(
-                "the number of elements of a block",
-                numbers,
-                bytes * numbers,
-            )?;
+            let what = "the number of elements of a block";
+            let n = cursor.count(what, numbers, bytes * numbers)?;
             sum += n;
             for _ in 0..n {
                 let place = self.contents.cursor.at();

@@ -60,20 +60,15 @@ impl Group {
             self.answer(point, end, operator, (time, time_increment))
         };
         let (here, matrix) = answer(end, Operator::Consistent)?;
-        let reach = start
-            .iter()
-            .zip(end)
-            .fold(0.0_f64, |r, (a, b)| r.max((b - a).abs()));
+        let moves = start.iter().zip(end).map(|(a, b)| (b - a).abs());
+        let reach = moves.fold(0.0, f64::max);
         let reach = if reach > 0.0 { reach } else { 1e-6 };
         // Of every entry the slope that comes closest to the tangent: one side of a kink may be
         // all that it is the derivative of.
         let mut slopes = vec![f64::INFINITY; n * n];
+        let sizes = DIFFERENCES.iter().map(|size| size * reach);
         for j in 0..n {
-            for h in DIFFERENCES
-                .iter()
-                .map(|size| size * reach)
-                .flat_map(|h| [h, -h])
-            {
+            for h in sizes.clone().flat_map(|h| [h, -h]) {
                 let mut moved = end.to_vec();
                 moved[j] += h;
                 let Some((there, _)) = answer(&moved, Operator::None) else {
@@ -91,20 +86,13 @@ impl Group {
         let names = law.hypothesis().components();
         let name = |i: usize| names[i].to_string();
         let onward: Vec<f64> = start.iter().zip(end).map(|(a, b)| b - a).collect();
-        let slopes_onward: Vec<Vec<f64>> = DIFFERENCES
-            .iter()
-            .filter_map(|size| {
-                let moved: Vec<f64> = end.iter().zip(&onward).map(|(e, d)| e + size * d).collect();
-                let (there, _) = answer(&moved, Operator::None)?;
-                Some(
-                    there
-                        .iter()
-                        .zip(&here)
-                        .map(|(a, b)| (a - b) / size)
-                        .collect(),
-                )
-            })
-            .collect();
+        let slope_onward = |size: &f64| {
+            let moved: Vec<f64> = end.iter().zip(&onward).map(|(e, d)| e + size * d).collect();
+            let (there, _) = answer(&moved, Operator::None)?;
+            let differences = there.iter().zip(&here).map(|(a, b)| a - b);
+            Some(differences.map(|difference| difference / size).collect())
+        };
+        let slopes_onward: Vec<Vec<f64>> = DIFFERENCES.iter().filter_map(slope_onward).collect();
         let of_entries = fault(n, &matrix, &slopes);
         let of_entries = of_entries.map(|fault| match fault {
             (relative, [i, j]) if i != n => Fault::Tangent(relative, [name(i), name(j)]),
