@@ -2,7 +2,6 @@
 
 use crate::pile::{self, Pile};
 use crate::probe::Probes;
-use mechanics::simulation::Snapshot;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -28,15 +27,6 @@ impl OutputRequest {
     pub fn columns(&self) -> impl Iterator<Item = &str> {
         let of_pile = self.pile.iter().flat_map(|_| pile::COLUMNS);
         self.probes.names().chain(of_pile)
-    }
-
-    /// The value of one of them in a state that nobody records; `None` where it has none.
-    pub fn quantity(&self, name: &str, snapshot: &Snapshot<'_>) -> Option<f64> {
-        let number = self.columns().position(|other| other == name)?;
-        let mut values = self.probes.values(snapshot);
-        let of_pile = self.pile.as_ref().and_then(|pile| pile.state(snapshot));
-        values.extend(of_pile.iter().flat_map(pile::State::values));
-        values.get(number).copied().flatten()
     }
 }
 
