@@ -151,6 +151,14 @@ def test_types_are_used(checker: str, here: Path) -> None:
     assert flagged(checker, here / "loose.py") == [3]
 
 
+def test_the_recipe_of_conda_is_that_of_the_package() -> None:
+    from importlib.metadata import requires, version
+
+    recipe = (ROOT / "host/python/conda/recipe.yaml").read_text()
+    assert f'version: "{version("pilum")}"' in recipe
+    assert [need.replace(">", " >") for need in requires("pilum") or []] == re.findall("- (numpy .*)", recipe)
+
+
 def test_the_package_needs_numpy_alone() -> None:
     from importlib.metadata import requires
 
