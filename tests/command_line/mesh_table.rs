@@ -61,8 +61,9 @@ fn shows_what_a_mesh_has() {
         "elements 1 triangle of 6 nodes, 1 quad of 8 nodes"
     );
     assert_eq!(of("extent"), "extent, m x 0 to 4, y 0 to 1");
-    assert_eq!(of("ground"), "ground 1 2");
-    assert_eq!(of("pile"), "pile 1 1");
+    // A rectangle; a triangle with sin atan(1/2) times 2/√3.
+    assert_eq!(of("ground"), "ground 1 2 1.000");
+    assert_eq!(of("pile"), "pile 1 1 0.516");
     assert_eq!(of("bottom"), "bottom 2 4 (0, 0), (4, 0)");
     // atan(1/2), at the corner (4, 0); the quad is a rectangle, and has the first right angle.
     let place = "element 12 of `pile` at (2.66667, 0.333333)";
@@ -101,6 +102,20 @@ fn says_what_is_refused() {
     assert!(solid.says("line 26: an element of type 4 is a tetrahedron"));
     assert_eq!(solid.stdout, "");
 
+    // Elements that are wrong are said one and all.
+    let two = shown(
+        &MESH
+            .replace("12 2 2 2 2 2 5 3\n", "12 2 2 2 2 2 7 3\n13 2 2 2 2 2 2 3\n")
+            .replace("$Elements\n7", "$Elements\n8"),
+    );
+    assert_eq!(two.code, Some(BAD_INPUT));
+    for fault in [
+        "line 27: element 12 has the node 7, which is not among the nodes",
+        "line 28: element 13 has the node 2 twice",
+    ] {
+        assert!(two.says(fault), "{}", two.stderr);
+    }
+
     let nodes = &MESH[MESH.find("$Nodes").unwrap()..MESH.find("$Elements").unwrap()];
     let format = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n";
     let elements = "$Elements\n1\n11 3 2 0 1 1 2 3 4\n$EndElements\n";
@@ -124,7 +139,7 @@ fn shows_and_draws_the_mesh_of_a_case() {
         of("elements"),
         "elements 6 quads of 8 nodes, 3 elements without thickness"
     );
-    assert_eq!(of("soil"), "soil 6 2");
+    assert_eq!(of("soil"), "soil 6 2 1.000");
     assert_eq!(of("layer"), "layer 3 2 long");
     assert_eq!(of("middle"), "middle 3 2 (0, 0.5), (2, 0.5)");
     assert!(outcome.stdout.ends_with("drawing in mesh.svg\n"));

@@ -1,4 +1,4 @@
-"""Calibrations and studies in Python have the numbers of the commands, and those of the libraries of others."""
+"""Calibrations and studies in Python have the numbers of the commands, and of SciPy; of lmfit, emcee and SALib in notebooks."""
 
 from __future__ import annotations
 
@@ -180,22 +180,6 @@ def test_derivatives_and_likelihood(boxes: tuple[pilum.Calibration, pilum.Calibr
         problem.log_likelihood([1.0])
 
 
-def test_lmfit_finds_what_the_command_finds(boxes: tuple[pilum.Calibration, pilum.CalibrationProblem]) -> None:
-    lmfit = needed("lmfit")
-    calibration, problem = boxes
-    parameters = lmfit.Parameters()
-    for name, start, (low, high) in zip(problem.names, problem.start, problem.bounds):
-        parameters.add(name, value=start, min=low, max=high)
-    found = lmfit.minimize(
-        lambda p: problem.residuals([p[name].value for name in problem.names]), parameters, method="least_squares",
-        x_scale=np.maximum(np.abs(problem.start), 1.0),
-    )
-    values = np.array([found.params[name].value for name in problem.names])
-    assert np.allclose(values, calibration.values, atol=0.0, rtol=1e-4)
-    assert found.chisqr == pytest.approx(calibration.sum_of_squares, rel=1e-6)
-    assert np.allclose(np.sqrt(np.diag(found.covar)), calibration.errors, rtol=1e-2)
-
-
 def test_scipy_finds_what_the_command_finds(boxes: tuple[pilum.Calibration, pilum.CalibrationProblem]) -> None:
     optimize = needed("scipy.optimize")
     calibration, problem = boxes
@@ -228,21 +212,6 @@ def test_names_belong_to_their_laws(here: Path) -> None:
     assert residuals @ residuals == pytest.approx(calibration.sum_of_squares, rel=1e-9)
     jacobian = problem.jacobian(problem.best)
     assert np.all(jacobian[11:, 0] == 0.0) and np.any(jacobian[:11, 1] != 0.0) and np.any(jacobian[11:, 1] != 0.0)
-
-
-def test_emcee_samples_the_intervals_of_the_command(boxes: tuple[pilum.Calibration, pilum.CalibrationProblem]) -> None:
-    emcee = needed("emcee")
-    calibration, problem = boxes
-    random = np.random.default_rng(3)
-    start = random.multivariate_normal(calibration.values, calibration.covariance, size=10)
-    sampler = emcee.EnsembleSampler(10, 3, problem.log_likelihood)
-    state = emcee.State(start, random_state=np.random.RandomState(3).get_state())
-    sampler.run_mcmc(state, 80)
-    chain = sampler.get_chain(discard=10, flat=True)
-    # Some 30 independent samples: means within half an error, deviations within 35 %.
-    print((chain.mean(axis=0) - calibration.values) / calibration.errors, chain.std(axis=0) / calibration.errors)
-    assert np.all(np.abs(chain.mean(axis=0) - calibration.values) < 0.5 * calibration.errors)
-    assert np.allclose(chain.std(axis=0), calibration.errors, rtol=0.35)
 
 
 def test_a_wrong_calibration_names_its_place(here: Path) -> None:
@@ -278,27 +247,6 @@ def test_a_study_is_an_object(saltelli: pilum.Study) -> None:
     assert arrow.num_rows == len(saltelli.curves) and "q_s" in arrow.column_names
     assert "<table>" in saltelli._repr_html_()
     assert pilum.table(saltelli.folder)["shaft"].tolist() == saltelli.runs["shaft"].tolist()
-
-
-def test_salib_has_the_indices_of_the_command(saltelli: pilum.Study, here: Path) -> None:
-    """Runs of SALib's order, as a sample, give the outputs of the command, and SALib their indices."""
-    analyze = needed("SALib.analyze.sobol")
-    order = [0, 1, 2, 3]  # in each group of base point: first sample, one parameter from the second each, second
-    groups = saltelli.sample.reshape(8, 4, 2)
-    first, second = groups[:, 0], groups[:, 3]
-    if not np.all((groups[:, 1, 0] == second[:, 0]) & (groups[:, 1, 1] == first[:, 1])):
-        order = [0, 2, 1, 3]
-    sample = groups[:, order].reshape(-1, 2)
-    again = pilum.study(saltelli.folder.parent / "study.toml", sample=sample, results=here / "again")
-    outputs = saltelli.runs["shaft"].reshape(8, 4)[:, order].ravel()
-    assert again.sample.tolist() == sample.tolist()
-    assert again.runs["shaft"].tolist() == outputs.tolist()
-    problem = {"num_vars": 2, "names": ["mu_p", "young_modulus"], "bounds": [[0.6, 0.8], [25e3, 45e3]]}
-    indices = analyze.analyze(problem, again.runs["shaft"], calc_second_order=False, num_resamples=10, seed=1)
-    effects = {str(row): saltelli.effects.where(parameter=row) for row in ("mu_p", "young_modulus")}
-    shares = [effects[name]["share"][0] for name in ("mu_p", "young_modulus")]
-    totals = [effects[name]["total"][0] for name in ("mu_p", "young_modulus")]
-    assert np.allclose(indices["S1"], shares, atol=1e-9) and np.allclose(indices["ST"], totals, atol=1e-9)
 
 
 def test_a_wrong_sample_is_refused(here: Path) -> None:

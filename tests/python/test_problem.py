@@ -70,6 +70,14 @@ def pushed(simulation: pilum.Simulation, head: str = "head") -> list[float]:
     return [-simulation.reaction(head)[1] for _ in simulation]
 
 
+def pushed_to(simulation: pilum.Simulation, phase: str) -> float:
+    """Load of the head at the end of a phase."""
+    for step in simulation:
+        if step["phase"] == phase and step["increment"] == step["of"]:
+            break
+    return -simulation.reaction("head")[1]
+
+
 def test_a_slice_of_a_pile_from_arrays() -> None:
     simulation = pilum.Problem(slice_case(), slice_mesh()).start()
     assert simulation.groups == ["pile", "shaft", "ground"] and "head" in simulation.lines
@@ -236,6 +244,54 @@ def test_steps_are_those_of_a_run(here: Path) -> None:
     loads = pushed(simulation, "pile_head")
     np.testing.assert_allclose(loads, results.history["q_t"], rtol=1e-9, atol=1e-9)
     assert not (here / "results").exists()
+
+
+def load_test() -> pilum.Problem:
+    """A short pile, loaded before its load test, which ends at a net load of 20 kN."""
+
+    def group(r: float, z: float) -> str:
+        return "ground" if r > 0.11 or z < -1.0 else "pile" if r < 0.1 else "shaft"
+
+    mesh = pilum.Mesh.grid([0.0, 0.1, 0.11, 0.3, 1.0], [-2.0, -1.0, 0.0], group)
+    mesh.name_line("axis", lambda r, z: r == 0.0)
+    mesh.name_line("outside", lambda r, z: r == 1.0)
+    mesh.name_line("bottom", lambda r, z: z == -2.0)
+    mesh.name_line("head", lambda r, z: (z == 0.0) & (r <= 0.1))
+    mesh.name_line("base", lambda r, z: (z == -1.0) & (r <= 0.1))
+    case = slice_case()
+    case["supports"] = [{"line": "axis", "fixed": ["r"]}, {"line": "outside", "fixed": ["r"]}, {"line": "bottom", "fixed": ["r", "z"]}]
+    case["pile"] = {"group": "pile", "shaft": "shaft", "base": "base", "head": "head"}
+    until = {"quantity": "pile_head_load_net", "reaches": 20.0}
+    case["phase"] = [
+        {"name": "dead load", "increments": 2, "displacement": [{"line": "head", "z": -1e-4}]},
+        {"name": "test", "increments": 10, "reset_displacements": True, "displacement": [{"line": "head", "z": -1e-3}], "until": until},
+    ]
+    return pilum.Problem(case, mesh)
+
+
+def test_a_load_test_ends_at_its_net_load(here: Path) -> None:
+    problem = load_test()
+    simulation = problem.start()
+    first = pushed_to(simulation, "dead load")
+    assert first > 1.0
+    simulation.step()
+    state = simulation.state()
+    other = simulation.copy()
+    assert state is not None and (state.phase, state.increment) == (1, 1)
+    loads = pushed(simulation)
+    # The net load is what a load cell shows: the reaction less that at the reset; `until` is met within 1 %.
+    assert 20.0 <= loads[-1] - first <= 20.2
+    assert simulation.step() is None and simulation.time < 2.0
+    history = problem.run("run").history
+    assert history["pile_head_load"][-1] == pytest.approx(loads[-1], rel=1e-9)
+    assert history["pile_head_load_net"][-1] == pytest.approx(loads[-1] - first, rel=1e-9)
+    # Others in the same state end alike.
+    assert pushed(other) == loads
+    simulation.go_to(state)
+    assert pushed(simulation) == loads
+    fresh = problem.start()
+    fresh.go_to(state)
+    assert pushed(fresh) == loads
 
 
 def test_a_step_has_the_keys_of_its_type() -> None:

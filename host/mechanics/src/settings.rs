@@ -210,6 +210,16 @@ pub enum Control {
 }
 
 impl Control {
+    /// Name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Load => "load",
+            Self::ArcLength => "arc_length",
+            Self::Viscous => "viscous",
+        }
+    }
+
     /// Whether a standstill is left by viscous relaxation.
     pub fn relaxes(self) -> bool {
         matches!(self, Self::Auto | Self::Load)

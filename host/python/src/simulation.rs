@@ -14,7 +14,8 @@ use mechanics::{State, Watch};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use results::OutputRequest;
+use results::HistoryValues;
+use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, MutexGuard, TryLockError};
 
 /// A problem on its way through its phases, in memory.
@@ -35,8 +36,8 @@ struct Inner {
     /// The last increment of the last phase is done. The simulation is not led beyond it: a state could not be taken
     /// of it any more.
     is_done: bool,
-    /// What the case measures, if that may end a phase.
-    wanted: Option<Arc<OutputRequest>>,
+    /// What the case measures, if that may end a phase, or depends on the states before.
+    values: Option<HistoryValues>,
     case: Case,
     written: Option<String>,
 }
@@ -47,6 +48,7 @@ struct Inner {
 pub(crate) struct SimulationState {
     state: State<'static>,
     likeness: Arc<Compatibility>,
+    values: Option<HistoryValues>,
     /// Number of the phase, from 0.
     #[pyo3(get)]
     phase: usize,
@@ -87,7 +89,7 @@ impl SimulationState {
 /// Hands on requests to stop and warnings, and measures what may end a phase.
 struct Follower<'c> {
     caller: &'c Caller<String>,
-    wanted: Option<&'c OutputRequest>,
+    values: Option<&'c mut HistoryValues>,
 }
 
 impl Watch for Follower<'_> {
@@ -95,8 +97,15 @@ impl Watch for Follower<'_> {
         self.caller.tell(warning.to_string());
     }
 
-    fn quantity(&mut self, _phase: &str, name: &str, state: &Snapshot<'_>) -> Option<f64> {
-        self.wanted?.quantity(name, state)
+    fn increment(&mut self, done: &Increment, state: &Snapshot<'_>) -> ControlFlow<()> {
+        if let Some(values) = &mut self.values {
+            values.increment(&done.place.phase, state);
+        }
+        ControlFlow::Continue(())
+    }
+
+    fn quantity(&mut self, phase: &str, name: &str, state: &Snapshot<'_>) -> Option<f64> {
+        self.values.as_mut()?.quantity(phase, name, state)
     }
 
     fn stop(&self) -> Stop {
@@ -141,15 +150,15 @@ impl Simulation {
         let mut inner = self.inner()?;
         let Inner {
             simulation,
-            wanted,
+            values,
             case,
             written,
             ..
         } = &mut *inner;
-        let wanted = wanted.as_deref();
+        let values = values.as_mut();
         let outcome = carry_out(
             py,
-            |caller| work(simulation, &mut Follower { caller, wanted }),
+            |caller| work(simulation, &mut Follower { caller, values }),
             |py, warning: String| warn(py, &warning),
         )?;
         outcome.map_err(|error| exception(py, &case.place(error), written.as_deref()))
@@ -217,14 +226,16 @@ impl Simulation {
                 let kept = ready.mesh_file.map(|file| file.kept.into());
                 let phases = &simulation.problem().phases;
                 let measures = phases.iter().any(|phase| phase.until.is_some());
-                let wanted = measures.then(|| case.wanted(&simulation)).transpose()?;
-                let wanted = wanted.map(Arc::new);
-                Ok((simulation, wanted, kept, case))
+                let wanted = (measures || case.file.pile.is_some())
+                    .then(|| case.wanted(&simulation))
+                    .transpose()?;
+                let values = wanted.map(|wanted| HistoryValues::new(wanted, &simulation));
+                Ok((simulation, values, kept, case))
             },
             |py, warning| warn(py, &warning),
         )?;
         let written = posed.written().map(str::to_owned);
-        let (simulation, wanted, kept, case) =
+        let (simulation, values, kept, case) =
             made.map_err(|error| exception(py, &error, written.as_deref()))?;
         Ok(Self {
             inner: Mutex::new(Inner {
@@ -232,7 +243,7 @@ impl Simulation {
                 kept,
                 likeness: None,
                 is_done: false,
-                wanted,
+                values,
                 case,
                 written,
             }),
@@ -407,6 +418,7 @@ impl Simulation {
             increment,
             reached: if is_whole { increment as f64 } else { reached },
             likeness: inner.likeness(),
+            values: inner.values.clone(),
             state,
         }))
     }
@@ -422,6 +434,9 @@ impl Simulation {
         let to = state.state.clone();
         self.working(py, |simulation, _| simulation.go_to(to))?;
         let mut inner = self.inner()?;
+        if let (Some(values), Some(there)) = (&mut inner.values, &state.values) {
+            values.go_to(there);
+        }
         let phases = &inner.simulation.problem().phases;
         let (number, phase) = (state.phase + 1, &phases[state.phase]);
         inner.is_done = number == phases.len() && state.increment == phase.increments;
@@ -434,7 +449,7 @@ impl Simulation {
         let Inner {
             simulation,
             is_done,
-            wanted,
+            values,
             case,
             written,
             likeness,
@@ -465,7 +480,7 @@ impl Simulation {
                 kept: kept.clone(),
                 likeness: likeness.clone(),
                 is_done: *is_done,
-                wanted: wanted.clone(),
+                values: values.clone(),
                 case: case.clone(),
                 written: written.clone(),
             }),

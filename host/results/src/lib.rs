@@ -5,6 +5,7 @@ pub mod checkpoint;
 mod fields;
 pub mod figure;
 mod file;
+mod history_values;
 mod leftovers;
 mod log_file;
 mod mesh_error;
@@ -27,6 +28,7 @@ mod table;
 
 pub use checkpoint::Checkpoint;
 pub use figure::Figures;
+pub use history_values::HistoryValues;
 pub use leftovers::{make_way, remove_comparison};
 pub use mesh_table::MeshTable;
 pub use output_request::OutputRequest;

@@ -113,27 +113,32 @@ impl MeshTable {
         parts.collect::<Vec<_>>().join(", ")
     }
 
-    fn groups(&self) -> Vec<[String; 3]> {
+    fn groups(&self) -> Vec<[String; 4]> {
         let mut sums = vec![(0, 0.0, 0.0); self.groups.len()];
+        let mut least: Vec<Option<f64>> = vec![None; self.groups.len()];
         for solid in &self.mesh.solids {
             let sum = &mut sums[solid.group];
             sum.0 += 1;
             sum.1 += solid.area(&self.mesh.nodes);
+            let own = solid.scaled_jacobian(&self.mesh.nodes);
+            let least = &mut least[solid.group];
+            *least = Some(least.map_or(own, |least| least.min(own)));
         }
         for joint in &self.mesh.joints {
             let sum = &mut sums[joint.group];
             sum.0 += 1;
             sum.2 += self.mesh.length(joint.minus);
         }
-        let row = |(name, (n, area, length)): (&String, (usize, f64, f64))| {
+        let row = |(number, (n, area, length)): (usize, (usize, f64, f64))| {
             let size = if length > 0.0 {
                 format!("{} long", short(length))
             } else {
                 short(area)
             };
-            [name.clone(), n.to_string(), size]
+            let least = least[number].map_or_else(String::new, |least| format!("{least:.3}"));
+            [self.groups[number].clone(), n.to_string(), size, least]
         };
-        self.groups.iter().zip(sums).map(row).collect()
+        sums.into_iter().enumerate().map(row).collect()
     }
 
     fn lines(&self) -> Vec<[String; 4]> {
@@ -213,7 +218,8 @@ impl Display for MeshTable {
             }
         }
         if !self.groups.is_empty() {
-            table(f, ["group", "elements", "area, m²"], &self.groups())?;
+            let head = ["group", "elements", "area, m²", "least scaled Jacobian"];
+            table(f, head, &self.groups())?;
         }
         if !self.mesh.lines.is_empty() {
             table(f, ["line", "edges", "length, m", "ends"], &self.lines())?;

@@ -2,7 +2,7 @@
 
 use crate::pile::{self, Pile};
 use crate::probe::Probes;
-use mechanics::simulation::{Part, Simulation, Snapshot};
+use mechanics::simulation::{Part, Simulation};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -37,15 +37,6 @@ impl OutputRequest {
             pile.looks_at(&mut part, simulation);
         }
         part
-    }
-
-    /// The value of one of them in a state that nobody records; `None` where it has none.
-    pub fn quantity(&self, name: &str, snapshot: &Snapshot<'_>) -> Option<f64> {
-        let number = self.columns().position(|other| other == name)?;
-        let mut values = self.probes.values(snapshot);
-        let of_pile = self.pile.as_ref().and_then(|pile| pile.state(snapshot));
-        values.extend(of_pile.iter().flat_map(pile::State::values));
-        values.get(number).copied().flatten()
     }
 }
 

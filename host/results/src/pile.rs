@@ -30,6 +30,7 @@ mod table;
 pub use criteria::{Criterion, Curve, Resistances};
 pub use downdrag::Downdrag;
 pub use geometry::Misfit;
+pub(crate) use net::Net;
 pub(crate) use record::{Kept, Record};
 
 use crate::probe::Sizes;
@@ -38,7 +39,6 @@ use mechanics::Simulation;
 use mechanics::group::Group;
 use mechanics::problem::{Analysis, Formulation};
 use mechanics::simulation::{Part, Snapshot};
-use net::Net;
 use rows::Row;
 use split::Split;
 use table::Stations;

@@ -4,6 +4,7 @@ use super::Wanted;
 use super::contents::{Contents, Element, Node};
 use super::cursor::Fault;
 use super::kind::{Kind, MOST_NODES};
+use super::words::{Faults, counted, list};
 use indexmap::IndexMap;
 use mechanics::element;
 use mechanics::mesh::{Line, Mesh, Solid};
@@ -21,8 +22,6 @@ type Ends = [usize; 2];
 const FARTHEST: f64 = 1e9;
 /// Lengths within this fraction of the mesh's size count as zero.
 const NOTHING: f64 = 1e-9;
-/// Names that a note lists.
-const MOST_NAMES: usize = 20;
 
 /// A side of an element.
 #[derive(Clone, Copy, Debug)]
@@ -120,37 +119,42 @@ impl<'a> Assembly<'a> {
     fn take_elements(&mut self) -> Result<(), Fault> {
         let contents = self.contents;
         let mut group_of_set: HashMap<(u8, usize), Vec<usize>> = HashMap::new();
+        let mut faults = Faults::default();
         for element in contents.elements.iter().filter(|e| e.kind.dimension() == 2) {
             let groups = group_of_set
                 .entry(Contents::set_of(element))
                 .or_insert_with(|| self.groups_of(element));
-            let group = match groups.as_slice() {
-                [] => continue,
-                [group] => *group,
-                [first, second, ..] => {
-                    let pair = [*first, *second];
-                    self.in_two_groups(element, pair)?;
-                    pair[0]
-                }
-            };
-            let nodes = contents.nodes_of(element)?;
-            // Format 2.2 has an element that is in two groups twice.
-            let mut key = nodes;
-            key.sort_unstable();
-            if let Some(&number) = self.own.get(&key) {
-                let (other, _, other_group) = self.taken[number];
-                if other_group != group {
-                    self.in_two_groups(element, [other_group, group])?;
-                    self.taken[number].2 = group.min(other_group);
-                    continue;
-                }
-                let both = contents.two_elements(other, element);
-                let message = format!("{both} have the same nodes");
-                return self.fault(element, &message);
-            }
-            self.own.insert(key, self.taken.len());
-            self.taken.push((element, nodes, group));
+            faults.add(self.take(element, groups))?;
         }
+        faults.refuse()
+    }
+
+    fn take(&mut self, element: &'a Element, groups: &[usize]) -> Result<(), Fault> {
+        let contents = self.contents;
+        let group = match groups {
+            [] => return Ok(()),
+            [group] => *group,
+            [first, second, ..] => {
+                self.in_two_groups(element, [*first, *second])?;
+                *first
+            }
+        };
+        let nodes = contents.nodes_of(element)?;
+        // Format 2.2 has an element that is in two groups twice.
+        let mut key = nodes;
+        key.sort_unstable();
+        if let Some(&number) = self.own.get(&key) {
+            let (other, _, other_group) = self.taken[number];
+            if other_group != group {
+                self.in_two_groups(element, [other_group, group])?;
+                self.taken[number].2 = group.min(other_group);
+                return Ok(());
+            }
+            let both = contents.two_elements(other, element);
+            return self.fault(element, &format!("{both} have the same nodes"));
+        }
+        self.own.insert(key, self.taken.len());
+        self.taken.push((element, nodes, group));
         Ok(())
     }
 
@@ -358,42 +362,51 @@ impl<'a> Assembly<'a> {
     fn sides(&self, mesh: &Mesh) -> Result<Vec<Option<Side>>, Fault> {
         let mut sides: Vec<Option<Side>> = vec![None; mesh.nodes.len()];
         let mut is_corner = vec![false; mesh.nodes.len()];
+        let mut faults = Faults::default();
         for (number, solid) in mesh.solids.iter().enumerate() {
-            let element = self.taken[number].0;
             for (edge, [a, b, middle]) in solid.edges().enumerate() {
                 is_corner[a] = true;
-                let owner = Some((number, edge));
-                let Some(side) = &mut sides[middle] else {
-                    let owners = [owner, None];
-                    let ends = [a, b];
-                    sides[middle] = Some(Side { ends, owners });
-                    continue;
-                };
-                let first = side.owners[0].map_or(number, |(first, _)| first);
-                let other = self.taken[first].0;
-                let both = || self.contents.two_elements(other, element);
-                if side.ends == [b, a] && side.owners[1].is_none() {
-                    side.owners[1] = owner;
-                    continue;
-                }
-                let message = if side.ends == [b, a] {
-                    let [third, other] = [element, other].map(|e| self.contents.element(e));
-                    format!("{third} is the third one on a side of {other}")
-                } else if side.ends == [a, b] {
-                    let both = both();
-                    format!("{both} lie on each other: both are on the same side of an edge")
-                } else {
-                    let both = both();
-                    format!("{both} have the middle of a side in common, but not its ends")
-                };
-                return self.fault(element, &message);
+                let side = &mut sides[middle];
+                faults.add(self.add_side(side, (number, edge), [a, b]))?;
             }
         }
+        faults.refuse()?;
         let mut corners = sides.iter().zip(&is_corner).filter(|(_, is)| **is);
         match corners.find_map(|(side, _)| side.as_ref()) {
             Some(side) => self.corner_in_the_middle(side),
             None => Ok(sides),
         }
+    }
+
+    /// Notes that an element has a side, with these ends, as it goes round.
+    fn add_side(
+        &self,
+        side: &mut Option<Side>,
+        owner: (usize, usize),
+        [a, b]: [usize; 2],
+    ) -> Result<(), Fault> {
+        let Some(side) = side else {
+            let owners = [Some(owner), None];
+            let ends = [a, b];
+            *side = Some(Side { ends, owners });
+            return Ok(());
+        };
+        if side.ends == [b, a] && side.owners[1].is_none() {
+            side.owners[1] = Some(owner);
+            return Ok(());
+        }
+        let first = side.owners[0].map_or(owner.0, |(first, _)| first);
+        let [other, element] = [first, owner.0].map(|number| self.taken[number].0);
+        let both = self.contents.two_elements(other, element);
+        let message = if side.ends == [b, a] {
+            let [third, one] = [element, other].map(|e| self.contents.element(e));
+            format!("{third} is the third one on a side of {one}")
+        } else if side.ends == [a, b] {
+            format!("{both} lie on each other: both are on the same side of an edge")
+        } else {
+            format!("{both} have the middle of a side in common, but not its ends")
+        };
+        self.fault(element, &message)
     }
 
     fn corner_in_the_middle<T>(&self, side: &Side) -> Result<T, Fault> {
@@ -532,24 +545,6 @@ impl<'a> Assembly<'a> {
                 counted(twins, "node", " is", "s are")
             ));
         }
-    }
-}
-
-/// `1 node is`, `2 nodes are`.
-pub(super) fn counted(n: usize, what: &str, one: &str, many: &str) -> String {
-    let verb = if n == 1 { one } else { many };
-    format!("{n} {what}{verb}")
-}
-
-/// Some names and how many more there are.
-pub(super) fn list(names: impl ExactSizeIterator<Item = String>) -> String {
-    let more = names.len().saturating_sub(MOST_NAMES);
-    let names: Vec<String> = names.take(MOST_NAMES).collect();
-    let names = names.join(", ");
-    if more == 0 {
-        names
-    } else {
-        format!("{names}, and {more} more")
     }
 }
 

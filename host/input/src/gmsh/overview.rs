@@ -1,7 +1,8 @@
 //! A mesh file before a case exists: its mesh with all names, and what a case should know.
 
-use super::assemble::{Assembled, assemble, counted, list};
+use super::assemble::{Assembled, assemble};
 use super::contents::Contents;
+use super::words::{counted, list};
 use super::{Counts, Wanted, counts, unreadable};
 use crate::Error;
 use mechanics::mesh::Mesh;

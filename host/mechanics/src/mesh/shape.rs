@@ -61,6 +61,18 @@ impl Solid {
         })
     }
 
+    /// Its scaled Jacobian: the least sine of its angles, of a triangle times 2/√3; 1 for a square and an equilateral
+    /// triangle, 0 or less where the Jacobian is not positive at a corner. `at` are coordinates of all nodes, m.
+    pub fn scaled_jacobian(&self, at: &[[f64; 2]]) -> f64 {
+        let scale = if self.n_corners() == 3 {
+            2.0 / 3.0_f64.sqrt()
+        } else {
+            1.0
+        };
+        let sines = self.angles(at).map(f64::sin);
+        scale * sines.fold(f64::INFINITY, f64::min)
+    }
+
     /// Whether no group can have it: a Jacobian is not positive, or it reaches across the axis. `at` are coordinates
     /// of all nodes, m.
     pub fn is_degenerate(&self, analysis: Analysis, at: &[[f64; 2]]) -> bool {

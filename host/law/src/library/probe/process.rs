@@ -49,12 +49,12 @@ pub fn has_had_children() -> bool {
     false
 }
 
-/// Bytes of the heap that are in use, of all threads; `None` where the system does not tell.
+/// Bytes of the heap that are in use, of all threads, below 4 GiB; `None` where the system does not tell.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 pub fn heap_in_use() -> Option<usize> {
-    // SAFETY: it reads counters of the allocator, and takes nothing.
-    let info = unsafe { nix::libc::mallinfo2() };
-    Some(info.uordblks + info.hblkhd)
+    // SAFETY: it reads counters of the allocator, and takes nothing. `mallinfo2` needs glibc 2.33.
+    let info = unsafe { nix::libc::mallinfo() };
+    Some(info.uordblks.wrapping_add(info.hblkhd).cast_unsigned() as usize)
 }
 
 /// Not known.
