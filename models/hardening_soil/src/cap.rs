@@ -29,6 +29,8 @@ pub(crate) struct Hardened {
 pub(crate) struct Hardening {
     start: f64,
     rest: f64,
+    /// Whether m is 1/2.
+    is_root: bool,
     /// p_p + c cot φ, kPa; infinite for φ = 0.
     size: f64,
     /// Rate dp_p/dε at the start, kPa, and of its logarithm.
@@ -50,6 +52,16 @@ impl Hardening {
             };
         }
         let z = self.relative * strain;
+        if self.is_root {
+            // A square, without transcendental functions.
+            let root = 1.0 + 0.5 * z;
+            let power = if root > 0.0 { root } else { f64::NAN };
+            return Hardened {
+                p_p: self.start + self.size * z * (1.0 + 0.25 * z),
+                by_strain: self.rate * power,
+                by_start: if self.is_at_floor { 1.0 } else { power },
+            };
+        }
         let exponent = if self.rest > 1e-9 {
             (self.rest * z).ln_1p() / self.rest
         } else {
@@ -119,6 +131,7 @@ impl Cap {
         Hardening {
             start: p_p,
             rest: soil.rest(),
+            is_root: soil.is_root,
             size,
             rate,
             relative: rate / size,

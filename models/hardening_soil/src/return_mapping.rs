@@ -83,6 +83,8 @@ pub(crate) struct Trial {
     pub(crate) slowing: f64,
     /// Weight of the end in the direction of the cap's flow; the rest is that of the start.
     pub(crate) theta: f64,
+    /// Residual, over the stress, from which on a last correction is enough.
+    pub(crate) tolerance: f64,
 }
 
 /// Where a trial stress returns to.
@@ -195,13 +197,16 @@ impl Soil {
         let mut multipliers = [0.0; 2];
         if let Some((guess, iterate)) = guess.and_then(|end| Some((end.zone, end.iterate?))) {
             (zone, multipliers) = (guess, iterate.multipliers);
+        } else if zone.merged == Merged::None && (zone.shear != Shear::None || zone.cap) {
+            // What was on an edge mostly stays there.
+            zone.merged = self.edge(&trial.start);
         }
         let mut is_guess = zone.merged != base;
         let hardening = self.cap.hardening(self, trial.p_p);
         let mut may_harden = true;
         for _ in 0..MAX_ZONES {
             let system = System::new(self, trial, zone, hardening);
-            let Some(end) = solve(&system, multipliers, size) else {
+            let Some(end) = solve(&system, multipliers, size, trial.tolerance) else {
                 if multipliers[0] + multipliers[1] > 0.0 {
                     multipliers = [0.0; 2];
                     continue;
@@ -255,6 +260,18 @@ impl Soil {
             }
         }
         None
+    }
+
+    /// The edge that stresses are on.
+    #[inline]
+    fn edge(&self, s: &[f64; 3]) -> Merged {
+        const NEAR: f64 = 1e-9;
+        let near = NEAR * self.size(s);
+        match (s[0] - s[1] <= near, s[1] - s[2] <= near) {
+            (true, false) => Merged::First12,
+            (false, true) => Merged::Last23,
+            _ => Merged::None,
+        }
     }
 
     /// All stresses at the apex or the tensile strength.
@@ -325,8 +342,12 @@ impl Soil {
             Shear::Limit => {
                 let (reached, ..) = self.gamma(s[0] - s[2], s[2]);
                 if may_harden && reached > gamma * (1.0 + MARGIN) {
+                    let [.., cap, _] = self.excess(s, end.p_p, gamma);
+                    let cap = zone.cap || cap > margin;
                     return Verdict::Other(Zone {
                         shear: Shear::Hardening,
+                        cap,
+                        cylinder: cap && s.iter().sum::<f64>() <= 0.0,
                         ..zone
                     });
                 }
@@ -417,23 +438,38 @@ enum Verdict {
     Other(Zone),
 }
 
-/// Newton's method for the multipliers.
+/// Newton's method for the multipliers. It ends with the last change of stress where what that leaves out is below
+/// round-off by the rate of convergence so far.
 #[inline]
-fn solve(system: &System<'_>, mut multipliers: [f64; 2], size: f64) -> Option<Iterate> {
+fn solve(
+    system: &System<'_>,
+    mut multipliers: [f64; 2],
+    size: f64,
+    tolerance: f64,
+) -> Option<Iterate> {
     const MAX_ITERATIONS: u32 = 30;
-    let mut before = f64::INFINITY;
+    /// Principal stresses that overtake each other by so many residuals will at the end.
+    const OVERTAKEN: f64 = 10.0;
+    let mut before = 0.0;
     for _ in 0..MAX_ITERATIONS {
-        let end = system.at(multipliers);
+        let mut end = system.at(multipliers);
         // A sum: the larger of two numbers would hide one that is none.
         let residual = (end.residual[0].abs() + end.residual[1].abs()) / size;
         if !(end.s[0] + end.s[1] + end.s[2] + residual).is_finite() {
             return None;
         }
-        if residual <= 1e-15 || (residual <= 1e-12 && residual >= 0.5 * before) {
+        if residual <= 1e-15 || (residual <= 1e-12 && residual >= 0.5 * before && before > 0.0) {
+            return Some(end);
+        }
+        if system.has_overtaken(&end, OVERTAKEN * residual * size) {
+            return Some(end);
+        }
+        let step = end.correction(&end.residual);
+        if residual <= tolerance && residual * residual * residual <= 1e-15 * before * before {
+            system.correct(&mut end, step);
             return Some(end);
         }
         before = residual;
-        let step = end.correction(&end.residual);
         multipliers = [multipliers[0] + step[0], multipliers[1] + step[1]];
     }
     None

@@ -71,7 +71,7 @@ pub(crate) struct Soil {
     pub(crate) a_ur: f64,
     m: f64,
     /// Whether m is 1/2.
-    is_root: bool,
+    pub(crate) is_root: bool,
     pub(crate) p_ref: f64,
     /// p_ref sin φ + c cos φ, kPa.
     pub(crate) strength: f64,

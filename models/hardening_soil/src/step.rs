@@ -16,6 +16,10 @@ const SMALL_STRESS: f64 = 0.02;
 /// How near the cap, over the stress, a step counts as beginning on it.
 const NEARLY: f64 = 1e-4;
 
+/// Residual, over the stress, below which the first pass takes its last correction, and the second.
+const PREDICTED: f64 = 1e-6;
+const ACCURATE: f64 = 1e-8;
+
 /// Halvings of a step.
 const MAX_HALVINGS: u32 = 10;
 
@@ -164,6 +168,7 @@ impl Soil {
         let [x_0, by_q, by_minor] = self.mobilised(begin.q, s_0[2]);
         let mobilised = [x_0, by_q * begin.by_gamma, by_q * begin.by_minor + by_minor];
         let pass = |E: f64, sin_psi: f64, theta: f64, guess: Option<&End>| {
+            let tolerance = if guess.is_some() { ACCURATE } else { PREDICTED };
             let trial: [f64; N] = array::from_fn(|i| from.stress[i] + E * unit[i]);
             let principal = Principal::of(&trial);
             let mut trial = Trial {
@@ -176,6 +181,7 @@ impl Soil {
                 gamma: from.gamma,
                 slowing: part.increment.slowing,
                 theta,
+                tolerance,
             };
             let mut end = self.return_stress(&trial, guess);
             if end.is_none() {
