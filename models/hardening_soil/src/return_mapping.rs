@@ -387,11 +387,16 @@ impl Soil {
 }
 
 impl End {
-    /// Rates of an end, from the rates of what it depends on.
+    /// Rates of an end, from the rates of what it depends on; those of p_p and γ_ps if they are asked for.
     #[inline]
-    pub(crate) fn rates(&self, system: Option<&(System<'_>, Iterate)>, of: &Rates) -> Rates {
+    pub(crate) fn rates(
+        &self,
+        system: Option<&(System<'_>, Iterate)>,
+        of: &Rates,
+        with_variables: bool,
+    ) -> Rates {
         match system {
-            Some((system, iterate)) => system.rates(iterate, of),
+            Some((system, iterate)) => system.rates(iterate, of, with_variables),
             None if self.zone.corner => Rates { s: [0.0; 3], ..*of },
             None => *of,
         }

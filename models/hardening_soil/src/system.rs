@@ -397,7 +397,7 @@ impl<'a> System<'a> {
 
     /// Rates of stress, p_p and γ_ps at the end; E, sin ψ_m and `start` of the result are unused.
     #[inline]
-    pub(crate) fn rates(&self, end: &Iterate, of: &Rates) -> Rates {
+    pub(crate) fn rates(&self, end: &Iterate, of: &Rates, with_variables: bool) -> Rates {
         let [Lambda, mu] = end.multipliers;
         let theta = self.trial.theta;
         let old = 1.0 - theta;
@@ -454,6 +454,9 @@ impl<'a> System<'a> {
             gamma: of.gamma,
             ..Rates::default()
         };
+        if !with_variables {
+            return rates;
+        }
         if self.zone.cap {
             let volume = d_mu * end.middle[0] + mu * (theta * mean(&s) + old * p_0);
             rates.p_p = end.by_start * of.p_p + end.by_strain * 2.0 * volume;
