@@ -78,11 +78,11 @@ impl Hardening {
 }
 
 impl Cap {
-    /// M and H of the oedometer, Eqs. (12) to (14).
+    /// M and H of the oedometer, Eqs. (12) to (14); `is_left_out`: the lateral stress is not given.
     ///
     /// # Errors
     /// No cap has this lateral stress.
-    pub(crate) fn new(soil: &Soil, E_oed: f64) -> Result<Self, Refusal> {
+    pub(crate) fn new(soil: &Soil, E_oed: f64, is_left_out: bool) -> Result<Self, Refusal> {
         let delta = (3.0 + soil.sin_phi) / (3.0 - soil.sin_phi);
         if let Some((M, H)) = shape(soil, E_oed, soil.k_0) {
             return Ok(Self { M, H, delta });
@@ -91,8 +91,14 @@ impl Cap {
             let reason = format!("{E_oed} kPa leaves no k_0_nc that a cap can have");
             return Err(Refusal::new("e_oed_ref", reason));
         };
+        let left_out = if is_left_out {
+            " (1 - sin φ, as none is given)"
+        } else {
+            ""
+        };
         let reason = format!(
-            "{} is outside {low:.4} to {high:.4}, what a cap with these stiffnesses can have",
+            "{}{left_out} is outside {low:.4} to {high:.4}, what a cap with these stiffnesses can have: give one in \
+             this range; a smaller e_oed_ref widens it",
             soil.k_0
         );
         Err(Refusal::new("k_0_nc", reason))

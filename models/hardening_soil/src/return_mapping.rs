@@ -85,6 +85,8 @@ pub(crate) struct Trial {
     pub(crate) theta: f64,
     /// Residual, over the stress, from which on a last correction is enough.
     pub(crate) tolerance: f64,
+    /// Whether to guess edges and surfaces before a solution shows them.
+    pub(crate) guesses: bool,
 }
 
 /// Where a trial stress returns to.
@@ -197,7 +199,10 @@ impl Soil {
         let mut multipliers = [0.0; 2];
         if let Some((guess, iterate)) = guess.and_then(|end| Some((end.zone, end.iterate?))) {
             (zone, multipliers) = (guess, iterate.multipliers);
-        } else if zone.merged == Merged::None && (zone.shear != Shear::None || zone.cap) {
+        } else if trial.guesses
+            && zone.merged == Merged::None
+            && (zone.shear != Shear::None || zone.cap)
+        {
             // What was on an edge mostly stays there.
             zone.merged = self.edge(&trial.start);
         }
@@ -343,7 +348,7 @@ impl Soil {
                 let (reached, ..) = self.gamma(s[0] - s[2], s[2]);
                 if may_harden && reached > gamma * (1.0 + MARGIN) {
                     let [.., cap, _] = self.excess(s, end.p_p, gamma);
-                    let cap = zone.cap || cap > margin;
+                    let cap = zone.cap || (trial.guesses && cap > margin);
                     return Verdict::Other(Zone {
                         shear: Shear::Hardening,
                         cap,
@@ -466,7 +471,7 @@ fn solve(
         if residual <= 1e-15 || (residual <= 1e-12 && residual >= 0.5 * before && before > 0.0) {
             return Some(end);
         }
-        if system.has_overtaken(&end, OVERTAKEN * residual * size) {
+        if system.trial.guesses && system.has_overtaken(&end, OVERTAKEN * residual * size) {
             return Some(end);
         }
         let step = end.correction(&end.residual);

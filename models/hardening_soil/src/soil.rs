@@ -169,7 +169,7 @@ impl Soil {
             tolerance: p.scheme_tolerance,
             cap: Cap::default(),
         };
-        soil.cap = Cap::new(&soil, or(p.e_oed_ref, p.e_50_ref))?;
+        soil.cap = Cap::new(&soil, or(p.e_oed_ref, p.e_50_ref), p.k_0_nc.is_nan())?;
         Ok(soil)
     }
 

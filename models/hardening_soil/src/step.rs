@@ -182,8 +182,13 @@ impl Soil {
                 slowing: part.increment.slowing,
                 theta,
                 tolerance,
+                guesses: true,
             };
             let mut end = self.return_stress(&trial, guess);
+            if end.is_none() {
+                trial.guesses = false;
+                end = self.return_stress(&trial, guess);
+            }
             if end.is_none() {
                 trial.theta = 1.0;
                 end = self.return_stress(&trial, None);
