@@ -458,8 +458,6 @@ fn solve(
     tolerance: f64,
 ) -> Option<Iterate> {
     const MAX_ITERATIONS: u32 = 30;
-    /// Principal stresses that overtake each other by so many residuals will at the end.
-    const OVERTAKEN: f64 = 10.0;
     let mut before = 0.0;
     for _ in 0..MAX_ITERATIONS {
         let mut end = system.at(multipliers);
@@ -469,9 +467,6 @@ fn solve(
             return None;
         }
         if residual <= 1e-15 || (residual <= 1e-12 && residual >= 0.5 * before && before > 0.0) {
-            return Some(end);
-        }
-        if system.trial.guesses && system.has_overtaken(&end, OVERTAKEN * residual * size) {
             return Some(end);
         }
         let step = end.correction(&end.residual);

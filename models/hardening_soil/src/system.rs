@@ -344,14 +344,6 @@ impl<'a> System<'a> {
         ]
     }
 
-    /// Whether flow of unmerged stresses has carried them past each other by more than `margin`.
-    #[inline]
-    pub(crate) fn has_overtaken(&self, end: &Iterate, margin: f64) -> bool {
-        let [Lambda, mu] = end.multipliers;
-        let by = (end.s[1] - end.s[0]).max(end.s[2] - end.s[1]);
-        self.zone.merged == Merged::None && by > margin && Lambda.min(mu) >= 0.0
-    }
-
     /// Whether the cut-off has to hold the stress back at this end.
     #[inline]
     pub(crate) fn needs_cut_off(&self, end: &Iterate, margin: f64) -> bool {
