@@ -53,6 +53,14 @@ const JOINT: &[(&str, f64)] = &[
     ("dilatancy_angle", 5.0),
 ];
 
+/// A medium dense sand.
+const HARDENING: &[(&str, f64)] = &[
+    ("e_50_ref", 34e3),
+    ("cohesion", 1.0),
+    ("friction_angle", 36.5),
+    ("dilatancy_angle", 6.0),
+];
+
 /// What the first internal variable, an accumulated plastic strain or slip, must do in the step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Flow {
@@ -88,6 +96,8 @@ pub(crate) const NAMES: &[&str] = &[
     "mohr_coulomb/edge",
     "mohr_coulomb_3d/elastic",
     "mohr_coulomb_3d/restart",
+    "hardening_soil/both",
+    "hardening_soil_3d/both",
     "oriented_mohr_coulomb/elastic",
     "oriented_mohr_coulomb/plastic",
     "coulomb_joint/elastic",
@@ -117,7 +127,11 @@ fn recipe(name: &str) -> Recipe<'_> {
             (None, false) => Hypothesis::Axisymmetric,
             (None, true) => Hypothesis::ThreeD,
         },
-        parameters: interface.unwrap_or(if law == "elastic" { &SOIL[..2] } else { SOIL }),
+        parameters: interface.unwrap_or(match law {
+            "elastic" => &SOIL[..2],
+            "hardening_soil" => HARDENING,
+            _ => SOIL,
+        }),
         flux: if interface.is_some() {
             PRESSED
         } else {
@@ -129,6 +143,7 @@ fn recipe(name: &str) -> Recipe<'_> {
             (None, Elastic, _) => small_strain,
             (None, Plastic, "large") => large_strain,
             (None, Plastic, "edge") => edge,
+            (None, Plastic, "both") => pressed,
             (None, Plastic, _) => restart,
         },
         flow,
@@ -182,6 +197,15 @@ fn large_strain(random: &mut Random, n: usize) -> Drawn {
 fn restart(random: &mut Random, n: usize) -> Drawn {
     let direction = mostly_shear(random, n);
     (scaled(direction, 5e-3), scaled(direction, 1e-4))
+}
+
+/// 0.2 % of shear with compression, then 1e-4 further in the same direction: a shear surface and a cap harden.
+fn pressed(random: &mut Random, n: usize) -> Drawn {
+    let mut direction = mostly_shear(random, n);
+    for e in &mut direction[..3] {
+        *e -= 0.2;
+    }
+    (scaled(direction, 2e-3), scaled(direction, 1e-4))
 }
 
 /// 1.5 % of triaxial compression along 22, then 1e-4 further.
@@ -376,7 +400,9 @@ fn reach(
         point.gradient_end[c] = before[c] + step[c];
     }
     point.integrate(law, 0, 1, Operator::None);
-    let flows = s > 0 && point.state_end[0] > point.state[0];
+    // Of hardening soil both the cap and the shear surface, which the first two variables are of.
+    let surfaces = if recipe.law == "hardening_soil" { 2 } else { 1 };
+    let flows = s > 0 && (0..surfaces).all(|i| point.state_end[i] > point.state[i]);
     points.gradient[i * n..(i + 1) * n].copy_from_slice(&point.gradient);
     points.gradient_end[i * n..(i + 1) * n].copy_from_slice(&point.gradient_end);
     points.flux[i * n..(i + 1) * n].copy_from_slice(&point.flux);

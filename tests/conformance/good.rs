@@ -41,6 +41,20 @@ fn elastic_passes() {
     passes(&library_of("elastic"));
 }
 
+/// What two surfaces make difficult, of both laws; a whole check takes too long.
+#[test]
+fn hardening_soil_passes_where_surfaces_matter() {
+    let ids = [
+        "handshake-is-accepted",
+        "tangent-matches-differences",
+        "initial-states-fit",
+        "response-is-isotropic",
+    ];
+    let only: Vec<&str> = ids.iter().flat_map(|id| ["--only", *id]).collect();
+    let report = check(&library_of("hardening_soil"), &only);
+    assert_eq!(report.with(&["passed"]), ids, "{:#}", report.json);
+}
+
 #[test]
 fn hyperbolic_joint_passes() {
     passes(&library_of("hyperbolic_joint"));

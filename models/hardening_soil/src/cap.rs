@@ -29,6 +29,8 @@ pub(crate) struct Hardened {
 pub(crate) struct Hardening {
     start: f64,
     rest: f64,
+    /// Whether m is 1/2.
+    is_root: bool,
     /// p_p + c cot φ, kPa; infinite for φ = 0.
     size: f64,
     /// Rate dp_p/dε at the start, kPa, and of its logarithm.
@@ -50,6 +52,16 @@ impl Hardening {
             };
         }
         let z = self.relative * strain;
+        if self.is_root {
+            // A square, without transcendental functions.
+            let root = 1.0 + 0.5 * z;
+            let power = if root > 0.0 { root } else { f64::NAN };
+            return Hardened {
+                p_p: self.start + self.size * z * (1.0 + 0.25 * z),
+                by_strain: self.rate * power,
+                by_start: if self.is_at_floor { 1.0 } else { power },
+            };
+        }
         let exponent = if self.rest > 1e-9 {
             (self.rest * z).ln_1p() / self.rest
         } else {
@@ -66,11 +78,11 @@ impl Hardening {
 }
 
 impl Cap {
-    /// M and H of the oedometer, Eqs. (12) to (14).
+    /// M and H of the oedometer, Eqs. (12) to (14); `is_left_out`: the lateral stress is not given.
     ///
     /// # Errors
     /// No cap has this lateral stress.
-    pub(crate) fn new(soil: &Soil, E_oed: f64) -> Result<Self, Refusal> {
+    pub(crate) fn new(soil: &Soil, E_oed: f64, is_left_out: bool) -> Result<Self, Refusal> {
         let delta = (3.0 + soil.sin_phi) / (3.0 - soil.sin_phi);
         if let Some((M, H)) = shape(soil, E_oed, soil.k_0) {
             return Ok(Self { M, H, delta });
@@ -79,8 +91,14 @@ impl Cap {
             let reason = format!("{E_oed} kPa leaves no k_0_nc that a cap can have");
             return Err(Refusal::new("e_oed_ref", reason));
         };
+        let left_out = if is_left_out {
+            " (1 - sin φ, as none is given)"
+        } else {
+            ""
+        };
         let reason = format!(
-            "{} is outside {low:.4} to {high:.4}, what a cap with these stiffnesses can have",
+            "{}{left_out} is outside {low:.4} to {high:.4}, what a cap with these stiffnesses can have: give one in \
+             this range; a smaller e_oed_ref widens it",
             soil.k_0
         );
         Err(Refusal::new("k_0_nc", reason))
@@ -119,6 +137,7 @@ impl Cap {
         Hardening {
             start: p_p,
             rest: soil.rest(),
+            is_root: soil.is_root,
             size,
             rate,
             relative: rate / size,

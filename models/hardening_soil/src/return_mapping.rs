@@ -83,6 +83,10 @@ pub(crate) struct Trial {
     pub(crate) slowing: f64,
     /// Weight of the end in the direction of the cap's flow; the rest is that of the start.
     pub(crate) theta: f64,
+    /// Residual, over the stress, from which on a last correction is enough.
+    pub(crate) tolerance: f64,
+    /// Whether to guess edges and surfaces before a solution shows them.
+    pub(crate) guesses: bool,
 }
 
 /// Where a trial stress returns to.
@@ -195,13 +199,19 @@ impl Soil {
         let mut multipliers = [0.0; 2];
         if let Some((guess, iterate)) = guess.and_then(|end| Some((end.zone, end.iterate?))) {
             (zone, multipliers) = (guess, iterate.multipliers);
+        } else if trial.guesses
+            && zone.merged == Merged::None
+            && (zone.shear != Shear::None || zone.cap)
+        {
+            // What was on an edge mostly stays there.
+            zone.merged = self.edge(&trial.start);
         }
         let mut is_guess = zone.merged != base;
         let hardening = self.cap.hardening(self, trial.p_p);
         let mut may_harden = true;
         for _ in 0..MAX_ZONES {
             let system = System::new(self, trial, zone, hardening);
-            let Some(end) = solve(&system, multipliers, size) else {
+            let Some(end) = solve(&system, multipliers, size, trial.tolerance) else {
                 if multipliers[0] + multipliers[1] > 0.0 {
                     multipliers = [0.0; 2];
                     continue;
@@ -255,6 +265,18 @@ impl Soil {
             }
         }
         None
+    }
+
+    /// The edge that stresses are on.
+    #[inline]
+    fn edge(&self, s: &[f64; 3]) -> Merged {
+        const NEAR: f64 = 1e-9;
+        let near = NEAR * self.size(s);
+        match (s[0] - s[1] <= near, s[1] - s[2] <= near) {
+            (true, false) => Merged::First12,
+            (false, true) => Merged::Last23,
+            _ => Merged::None,
+        }
     }
 
     /// All stresses at the apex or the tensile strength.
@@ -325,8 +347,12 @@ impl Soil {
             Shear::Limit => {
                 let (reached, ..) = self.gamma(s[0] - s[2], s[2]);
                 if may_harden && reached > gamma * (1.0 + MARGIN) {
+                    let [.., cap, _] = self.excess(s, end.p_p, gamma);
+                    let cap = zone.cap || (trial.guesses && cap > margin);
                     return Verdict::Other(Zone {
                         shear: Shear::Hardening,
+                        cap,
+                        cylinder: cap && s.iter().sum::<f64>() <= 0.0,
                         ..zone
                     });
                 }
@@ -366,11 +392,16 @@ impl Soil {
 }
 
 impl End {
-    /// Rates of an end, from the rates of what it depends on.
+    /// Rates of an end, from the rates of what it depends on; those of p_p and γ_ps if they are asked for.
     #[inline]
-    pub(crate) fn rates(&self, system: Option<&(System<'_>, Iterate)>, of: &Rates) -> Rates {
+    pub(crate) fn rates(
+        &self,
+        system: Option<&(System<'_>, Iterate)>,
+        of: &Rates,
+        with_variables: bool,
+    ) -> Rates {
         match system {
-            Some((system, iterate)) => system.rates(iterate, of),
+            Some((system, iterate)) => system.rates(iterate, of, with_variables),
             None if self.zone.corner => Rates { s: [0.0; 3], ..*of },
             None => *of,
         }
@@ -417,23 +448,33 @@ enum Verdict {
     Other(Zone),
 }
 
-/// Newton's method for the multipliers.
+/// Newton's method for the multipliers. It ends with the last change of stress where what that leaves out is below
+/// round-off by the rate of convergence so far.
 #[inline]
-fn solve(system: &System<'_>, mut multipliers: [f64; 2], size: f64) -> Option<Iterate> {
+fn solve(
+    system: &System<'_>,
+    mut multipliers: [f64; 2],
+    size: f64,
+    tolerance: f64,
+) -> Option<Iterate> {
     const MAX_ITERATIONS: u32 = 30;
-    let mut before = f64::INFINITY;
+    let mut before = 0.0;
     for _ in 0..MAX_ITERATIONS {
-        let end = system.at(multipliers);
+        let mut end = system.at(multipliers);
         // A sum: the larger of two numbers would hide one that is none.
         let residual = (end.residual[0].abs() + end.residual[1].abs()) / size;
         if !(end.s[0] + end.s[1] + end.s[2] + residual).is_finite() {
             return None;
         }
-        if residual <= 1e-15 || (residual <= 1e-12 && residual >= 0.5 * before) {
+        if residual <= 1e-15 || (residual <= 1e-12 && residual >= 0.5 * before && before > 0.0) {
+            return Some(end);
+        }
+        let step = end.correction(&end.residual);
+        if residual <= tolerance && residual * residual * residual <= 1e-15 * before * before {
+            system.correct(&mut end, step);
             return Some(end);
         }
         before = residual;
-        let step = end.correction(&end.residual);
         multipliers = [multipliers[0] + step[0], multipliers[1] + step[1]];
     }
     None

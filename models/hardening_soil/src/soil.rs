@@ -71,10 +71,16 @@ pub(crate) struct Soil {
     pub(crate) a_ur: f64,
     m: f64,
     /// Whether m is 1/2.
-    is_root: bool,
+    pub(crate) is_root: bool,
     pub(crate) p_ref: f64,
     /// p_ref sin φ + c cos φ, kPa.
     pub(crate) strength: f64,
+    /// Slope of the ratio of Eq. (1), 1/kPa, and its value without stress.
+    ratio_slope: f64,
+    ratio_at_0: f64,
+    /// Slope of q_f and its value without stress, kPa.
+    q_f_slope: f64,
+    q_f_at_0: f64,
     r_f: f64,
     pub(crate) k_0: f64,
     /// Tensile strength, kPa; c cot φ if none cuts the apex off, infinite for φ = 0.
@@ -133,6 +139,7 @@ impl Soil {
         }
         let sin_psi = p.dilatancy_angle.to_radians().sin();
         let nu = p.nu_ur;
+        let reference = p.p_ref * sin_phi + p.cohesion * cos_phi;
         let mut soil = Self {
             sin_phi,
             c_cos_phi: p.cohesion * cos_phi,
@@ -147,7 +154,11 @@ impl Soil {
             m: p.m,
             is_root: (p.m - 0.5).abs() < f64::EPSILON,
             p_ref: p.p_ref,
-            strength: p.p_ref * sin_phi + p.cohesion * cos_phi,
+            strength: reference,
+            ratio_slope: sin_phi / reference,
+            ratio_at_0: p.cohesion * cos_phi / reference,
+            q_f_slope: 2.0 * sin_phi / (1.0 - sin_phi),
+            q_f_at_0: 2.0 * p.cohesion * cos_phi / (1.0 - sin_phi),
             r_f: p.r_f,
             k_0: or(p.k_0_nc, 1.0 - sin_phi),
             R_t: strength.cut_off().unwrap_or(apex),
@@ -158,16 +169,16 @@ impl Soil {
             tolerance: p.scheme_tolerance,
             cap: Cap::default(),
         };
-        soil.cap = Cap::new(&soil, or(p.e_oed_ref, p.e_50_ref))?;
+        soil.cap = Cap::new(&soil, or(p.e_oed_ref, p.e_50_ref), p.k_0_nc.is_nan())?;
         Ok(soil)
     }
 
     /// (σ + c cot φ)/(p_ref + c cot φ) of a stress and its derivative, 1 for φ = 0, not below the floor.
     #[inline]
     pub(crate) fn ratio(&self, at: f64) -> Slope {
-        let ratio = (at * self.sin_phi + self.c_cos_phi) / self.strength;
+        let ratio = at * self.ratio_slope + self.ratio_at_0;
         if ratio > FLOOR {
-            (ratio, self.sin_phi / self.strength)
+            (ratio, self.ratio_slope)
         } else {
             (FLOOR, 0.0)
         }
@@ -207,9 +218,7 @@ impl Soil {
     /// The strength q_f above a minor stress, kPa, Eq. (4), and its derivative.
     #[inline]
     pub(crate) fn q_f(&self, minor: f64) -> Slope {
-        let slope = 2.0 * self.sin_phi / (1.0 - self.sin_phi);
-        let constant = 2.0 * self.c_cos_phi / (1.0 - self.sin_phi);
-        (minor * slope + constant, slope)
+        (minor * self.q_f_slope + self.q_f_at_0, self.q_f_slope)
     }
 
     /// γ_ps whose shear surface goes through q above a minor stress, Eq. (3), with derivatives by q

@@ -16,6 +16,10 @@ const SMALL_STRESS: f64 = 0.02;
 /// How near the cap, over the stress, a step counts as beginning on it.
 const NEARLY: f64 = 1e-4;
 
+/// Residual, over the stress, below which the first pass takes its last correction, and the second.
+const PREDICTED: f64 = 1e-6;
+const ACCURATE: f64 = 1e-8;
+
 /// Halvings of a step.
 const MAX_HALVINGS: u32 = 10;
 
@@ -164,6 +168,7 @@ impl Soil {
         let [x_0, by_q, by_minor] = self.mobilised(begin.q, s_0[2]);
         let mobilised = [x_0, by_q * begin.by_gamma, by_q * begin.by_minor + by_minor];
         let pass = |E: f64, sin_psi: f64, theta: f64, guess: Option<&End>| {
+            let tolerance = if guess.is_some() { ACCURATE } else { PREDICTED };
             let trial: [f64; N] = array::from_fn(|i| from.stress[i] + E * unit[i]);
             let principal = Principal::of(&trial);
             let mut trial = Trial {
@@ -176,8 +181,14 @@ impl Soil {
                 gamma: from.gamma,
                 slowing: part.increment.slowing,
                 theta,
+                tolerance,
+                guesses: true,
             };
             let mut end = self.return_stress(&trial, guess);
+            if end.is_none() {
+                trial.guesses = false;
+                end = self.return_stress(&trial, guess);
+            }
             if end.is_none() {
                 trial.theta = 1.0;
                 end = self.return_stress(&trial, None);
@@ -249,6 +260,15 @@ impl Soil {
         };
         let (start, turn_1, turn_2) = (step.start.turn(), axes_1.turn(), axes_2.turn());
         let (system_1, system_2) = (self.system(trial_1, end_1), self.system(trial_2, end_2));
+        let kappa: [f64; N] = array::from_fn(|i| {
+            if i < 3 {
+                1.0
+            } else {
+                end_2.kappa(self, trial_2, axes_2.pair(i))
+            }
+        });
+        // Nothing follows a whole increment.
+        let is_last = part.fraction >= 1.0;
         let mut error = [0.0; N];
         let columns = array::from_fn(|j| {
             let column = &from.columns[j];
@@ -274,23 +294,18 @@ impl Soil {
             of.E = stiffening * E_0_slope * d_s_0[2] + stiffening_slope[j] * E_0;
             of.s = turn_1.normal(&trial(trial_1.E, of.E));
             of.sin_psi = (at_0[1] + at_0[2]) * d_x_0;
-            let d_s_1 = end_1.rates(system_1.as_ref(), &of).s;
+            let d_s_1 = end_1.rates(system_1.as_ref(), &of, false).s;
             let d_middle = 0.5 * (d_s_0[2] + d_s_1[2]);
             of.E = stiffening * E_slope * d_middle + stiffening_slope[j] * E;
             let moved = turn_2.stress(&trial(trial_2.E, of.E));
             of.s = [moved[0], moved[1], moved[2]];
             let d_x_1 = x_1_by_q * (d_s_1[0] - d_s_1[2]) + x_1_by_minor * d_s_1[2];
             of.sin_psi = over[1] * d_x_0 + over[2] * d_x_1;
-            let end = end_2.rates(system_2.as_ref(), &of);
+            let end = end_2.rates(system_2.as_ref(), &of, !is_last);
             let d_size = by_size * self.size_rate(&s_0, &d_s_0);
             error[j] = (sign * (end.s[worst] - d_s_1[worst]) - d_size) / step.size;
-            let kept: [f64; N] = array::from_fn(|i| {
-                if i < 3 {
-                    end.s[i]
-                } else {
-                    end_2.kappa(self, trial_2, axes_2.pair(i)) * moved[i]
-                }
-            });
+            let kept: [f64; N] =
+                array::from_fn(|i| if i < 3 { end.s[i] } else { kappa[i] * moved[i] });
             Point {
                 stress: turn_2.back(&kept),
                 p_p: end.p_p,
@@ -344,14 +359,14 @@ impl Soil {
         let whole = self.step(&from.0, part);
         // How far the error is from half the tolerance to all of it.
         let excess = |s: &Step<N>| (2.0 * s.error / self.tolerance - 1.0).clamp(0.0, 1.0);
-        let whole = whole.filter(|step| excess(step) < 1.0);
-        let weighed = whole.map(|step| {
+        let weighed = whole.as_ref().filter(|step| excess(step) < 1.0);
+        let weighed = weighed.map(|step| {
             let (derivative, error) = if part.with_derivative {
-                self.differentiate(&step, &from.1, part)
+                self.differentiate(step, &from.1, part)
             } else {
                 (Derivative::ZERO, [0.0; N])
             };
-            (step.end, derivative, excess(&step), error)
+            (step.end, derivative, excess(step), error)
         });
         if let Some((end, derivative, weight, _)) = weighed
             && weight <= 0.0

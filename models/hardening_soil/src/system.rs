@@ -6,6 +6,7 @@
 use crate::cap::Hardening;
 use crate::return_mapping::{Merged, Shear, Trial, Zone};
 use crate::soil::Soil;
+use std::array;
 
 /// Σ xᵢ yᵢ.
 #[inline]
@@ -16,7 +17,7 @@ pub(crate) fn dot(x: &[f64; 3], y: &[f64; 3]) -> f64 {
 /// x + factor y.
 #[inline]
 fn plus(x: &[f64; 3], factor: f64, y: &[f64; 3]) -> [f64; 3] {
-    std::array::from_fn(|i| x[i] + factor * y[i])
+    array::from_fn(|i| x[i] + factor * y[i])
 }
 
 #[inline]
@@ -41,6 +42,8 @@ pub(crate) struct Iterate {
     jacobian: [[f64; 2]; 2],
     /// Derivative of the first condition by γ_ps.
     by_gamma: f64,
+    /// Changes of p and q̃ from those that the flow of the cap leaves out of account.
+    response: [[f64; 2]; 2],
     /// p_p and its derivatives by the cap's volume strain and by p_p at the start.
     pub(crate) p_p: f64,
     by_strain: f64,
@@ -77,6 +80,8 @@ pub(crate) struct System<'a> {
     by_shear: [f64; 3],
     by_p: [f64; 3],
     by_q: [f64; 3],
+    /// p and q̃ of these two, p first.
+    coupling: [[f64; 2]; 2],
     /// p and q̃ at the start.
     start: [f64; 2],
     hardening: Hardening,
@@ -100,17 +105,33 @@ impl<'a> System<'a> {
             by_shear: [0.0; 3],
             by_p: [0.0; 3],
             by_q: [0.0; 3],
-            start: [mean(&trial.start), soil.cap.q(&trial.start)],
+            coupling: [[0.0; 2]; 2],
+            start: [0.0; 2],
             hardening,
         };
         system.s = system.condensed(&trial.s, soil.R_t);
-        let M = soil.cap.M;
-        system.by_shear = system.elastic(&system.flow(system.sin_psi()));
-        if !zone.cylinder {
-            system.by_p = system.elastic(&[2.0 / 3.0; 3]);
+        if zone.shear != Shear::None {
+            system.by_shear = system.elastic(&system.flow(system.sin_psi()));
         }
-        system.by_q = system.elastic(&a.map(|a| 2.0 / (M * M) * a));
+        if zone.cap {
+            system.add_cap();
+        }
         system
+    }
+
+    #[inline]
+    fn add_cap(&mut self) {
+        let Soil { cap, .. } = self.soil;
+        self.start = [mean(&self.trial.start), cap.q(&self.trial.start)];
+        let factor = 2.0 / (cap.M * cap.M);
+        if !self.zone.cylinder {
+            self.by_p = self.elastic(&[2.0 / 3.0; 3]);
+        }
+        self.by_q = self.elastic(&self.a.map(|a| factor * a));
+        self.coupling = [
+            [mean(&self.by_p), mean(&self.by_q)],
+            [dot(&self.a, &self.by_p), dot(&self.a, &self.by_q)],
+        ];
     }
 
     /// sin ψ_m of the flow: at the strength that of ψ.
@@ -202,22 +223,21 @@ impl<'a> System<'a> {
         ]
     }
 
-    /// The change of stress that follows a direct change, since the cap's flow depends on the stress.
+    /// The p and q̃ that follow direct changes of them, since the cap's flow depends on the stress.
     #[inline]
-    fn respond(&self, direct: &[f64; 3], mu: f64) -> [f64; 3] {
-        let w = mu * self.trial.theta;
-        if w == 0.0 {
-            return *direct;
-        }
-        let (pp, pq) = (1.0 + w * mean(&self.by_p), w * mean(&self.by_q));
-        let (qp, qq) = (
-            w * dot(&self.a, &self.by_p),
-            1.0 + w * dot(&self.a, &self.by_q),
-        );
+    fn response(&self, w: f64) -> [[f64; 2]; 2] {
+        let [[pp, pq], [qp, qq]] = self.coupling;
+        let (pp, pq, qp, qq) = (1.0 + w * pp, w * pq, w * qp, 1.0 + w * qq);
+        let scale = w / (pp * qq - pq * qp);
+        [[qq * scale, -pq * scale], [-qp * scale, pp * scale]]
+    }
+
+    /// The change of stress that follows a direct change.
+    #[inline]
+    fn respond(&self, direct: &[f64; 3], [[pp, pq], [qp, qq]]: &[[f64; 2]; 2]) -> [f64; 3] {
         let (p, q) = (mean(direct), dot(&self.a, direct));
-        let scale = 1.0 / (pp * qq - pq * qp);
-        let (p, q) = ((qq * p - pq * q) * scale, (pp * q - qp * p) * scale);
-        plus(&plus(direct, -w * p, &self.by_p), -w * q, &self.by_q)
+        let (p, q) = (pp * p + pq * q, qp * p + qq * q);
+        array::from_fn(|i| direct[i] - p * self.by_p[i] - q * self.by_q[i])
     }
 
     /// Stress, conditions and their derivatives.
@@ -225,35 +245,35 @@ impl<'a> System<'a> {
     pub(crate) fn at(&self, multipliers: [f64; 2]) -> Iterate {
         let [Lambda, mu] = multipliers;
         let (soil, theta) = (self.soil, self.trial.theta);
-        let [p_0, q_0] = self.start;
-        let mut s = plus(&self.s, -Lambda, &self.by_shear);
-        let mut middle = [0.0; 2];
-        if self.zone.cap {
-            let old = mu * (1.0 - theta);
-            s = plus(&plus(&s, -old * p_0, &self.by_p), -old * q_0, &self.by_q);
-            s = self.respond(&s, mu);
-            middle = [
-                (1.0 - theta) * p_0 + theta * mean(&s),
-                (1.0 - theta) * q_0 + theta * dot(&self.a, &s),
-            ];
-        }
-        let flow = plus(&self.by_p.map(|x| -middle[0] * x), -middle[1], &self.by_q);
         let mut end = Iterate {
-            s,
+            s: plus(&self.s, -Lambda, &self.by_shear),
             multipliers,
             residual: [0.0; 2],
-            middle,
-            by_multiplier: [
-                self.respond(&self.by_shear.map(|x| -x), mu),
-                self.respond(&flow, mu),
-            ],
+            middle: [0.0; 2],
+            by_multiplier: [self.by_shear.map(|x| -x), [0.0; 3]],
             gradient: [[0.0; 3]; 2],
             jacobian: [[1.0, 0.0], [0.0, 1.0]],
             by_gamma: 0.0,
+            response: [[0.0; 2]; 2],
             p_p: self.trial.p_p,
             by_strain: 0.0,
             by_start: 1.0,
         };
+        if self.zone.cap {
+            end.response = self.response(mu * theta);
+            let [p_0, q_0] = self.start.map(|x| mu * (1.0 - theta) * x);
+            let direct: [f64; 3] =
+                array::from_fn(|i| end.s[i] - p_0 * self.by_p[i] - q_0 * self.by_q[i]);
+            end.s = self.respond(&direct, &end.response);
+            end.middle = self.middle(&end.s);
+            let [p, q] = end.middle;
+            let flow = array::from_fn(|i| -p * self.by_p[i] - q * self.by_q[i]);
+            end.by_multiplier = [
+                self.respond(&end.by_multiplier[0], &end.response),
+                self.respond(&flow, &end.response),
+            ];
+        }
+        let s = end.s;
         if self.zone.shear != Shear::None {
             let [growth, weight, ..] = self.growth(Lambda);
             let (q, by_minor);
@@ -268,18 +288,18 @@ impl<'a> System<'a> {
             end.gradient[0] = [1.0, 0.0, -1.0 - by_minor];
             end.jacobian[0] = [
                 dot(&end.gradient[0], &end.by_multiplier[0]) + end.by_gamma * weight,
-                if self.zone.cap {
-                    dot(&end.gradient[0], &end.by_multiplier[1])
-                } else {
-                    0.0
-                },
+                dot(&end.gradient[0], &end.by_multiplier[1]),
             ];
         }
         if self.zone.cap {
             let M = soil.cap.M;
             let (p, q) = (mean(&s), dot(&self.a, &s));
             let size = soil.cap.size(q, p);
-            let pressure = if self.zone.cylinder { 0.0 } else { middle[0] };
+            let pressure = if self.zone.cylinder {
+                0.0
+            } else {
+                end.middle[0]
+            };
             let mut hardened = self.hardening.after(2.0 * mu * pressure);
             if self.zone.cylinder {
                 hardened.by_strain = 0.0;
@@ -291,15 +311,37 @@ impl<'a> System<'a> {
             let by_q = q / (M * M * size);
             end.gradient[1] = plus(&THIRD.map(|x| x * by_p), by_q, &self.a);
             end.jacobian[1] = [
-                if self.zone.shear == Shear::None {
-                    0.0
-                } else {
-                    dot(&end.gradient[1], &end.by_multiplier[0])
-                },
-                dot(&end.gradient[1], &end.by_multiplier[1]) - hardened.by_strain * 2.0 * middle[0],
+                dot(&end.gradient[1], &end.by_multiplier[0]),
+                dot(&end.gradient[1], &end.by_multiplier[1]) - hardened.by_strain * 2.0 * pressure,
             ];
         }
         end
+    }
+
+    /// The iterate after a small change of the multipliers; its derivatives stay.
+    #[inline]
+    pub(crate) fn correct(&self, end: &mut Iterate, step: [f64; 2]) {
+        let [by_Lambda, by_mu] = end.by_multiplier;
+        end.s = array::from_fn(|i| end.s[i] + step[0] * by_Lambda[i] + step[1] * by_mu[i]);
+        end.multipliers = [end.multipliers[0] + step[0], end.multipliers[1] + step[1]];
+        if self.zone.cap {
+            end.middle = self.middle(&end.s);
+            if !self.zone.cylinder {
+                let volume = 2.0 * end.multipliers[1] * end.middle[0];
+                end.p_p = self.hardening.after(volume).p_p;
+            }
+        }
+    }
+
+    /// p and q̃ that the cap's flow follows.
+    #[inline]
+    fn middle(&self, s: &[f64; 3]) -> [f64; 2] {
+        let theta = self.trial.theta;
+        let [p_0, q_0] = self.start;
+        [
+            (1.0 - theta) * p_0 + theta * mean(s),
+            (1.0 - theta) * q_0 + theta * dot(&self.a, s),
+        ]
     }
 
     /// Whether the cut-off has to hold the stress back at this end.
@@ -310,7 +352,7 @@ impl<'a> System<'a> {
         let shear = self.flow(self.sin_psi());
         let [p, q] = end.middle;
         let p = if self.zone.cylinder { 0.0 } else { p };
-        let flow: [f64; 3] = std::array::from_fn(|i| {
+        let flow: [f64; 3] = array::from_fn(|i| {
             Lambda * shear[i] + mu * (2.0 / 3.0 * p + 2.0 * q / (cap.M * cap.M) * self.a[i])
         });
         let trial = match self.zone.merged {
@@ -347,7 +389,7 @@ impl<'a> System<'a> {
 
     /// Rates of stress, p_p and γ_ps at the end; E, sin ψ_m and `start` of the result are unused.
     #[inline]
-    pub(crate) fn rates(&self, end: &Iterate, of: &Rates) -> Rates {
+    pub(crate) fn rates(&self, end: &Iterate, of: &Rates, with_variables: bool) -> Rates {
         let [Lambda, mu] = end.multipliers;
         let theta = self.trial.theta;
         let old = 1.0 - theta;
@@ -361,7 +403,7 @@ impl<'a> System<'a> {
         };
         if u != 0.0 {
             let zero = self.flow(0.0);
-            let turn: [f64; 3] = std::array::from_fn(|i| self.flow(1.0)[i] - zero[i]);
+            let turn: [f64; 3] = array::from_fn(|i| self.flow(1.0)[i] - zero[i]);
             direct = plus(&direct, -Lambda * u, &self.elastic(&turn));
         }
         let (p_0, q_0) = (mean(&of.start), self.soil.cap.q(&of.start));
@@ -377,7 +419,7 @@ impl<'a> System<'a> {
                 &self.by_q,
             );
         }
-        let fixed = self.respond(&direct, mu);
+        let fixed = self.respond(&direct, &end.response);
         let [growth, weight, by_u, by_apart] = self.growth(Lambda);
         let difference = self.trial.s[0] - self.trial.s[1];
         let apart = self.apart(of.s[0] - of.s[1] - by_E * difference);
@@ -404,6 +446,9 @@ impl<'a> System<'a> {
             gamma: of.gamma,
             ..Rates::default()
         };
+        if !with_variables {
+            return rates;
+        }
         if self.zone.cap {
             let volume = d_mu * end.middle[0] + mu * (theta * mean(&s) + old * p_0);
             rates.p_p = end.by_start * of.p_p + end.by_strain * 2.0 * volume;

@@ -282,6 +282,33 @@ fn refusals_name_the_range() {
         message.starts_with("k_0_nc: 0.25 is outside 0.3"),
         "{message}"
     );
+    // A dense sand of which only E_50 and angles are known, and the two ways out that the message names.
+    let dense = SoilParameters {
+        e_oed_ref: f64::NAN,
+        e_ur_ref: f64::NAN,
+        m: 0.5,
+        nu_ur: 0.2,
+        dilatancy_angle: 14.0,
+        k_0_nc: f64::NAN,
+        ..DENSE
+    };
+    let message = refusal(dense);
+    for part in [
+        "k_0_nc: 0.33",
+        "1 - sin φ",
+        "outside 0.3386 to",
+        "e_oed_ref",
+    ] {
+        assert!(message.contains(part), "{message}");
+    }
+    law(SoilParameters {
+        k_0_nc: 0.339,
+        ..dense
+    });
+    law(SoilParameters {
+        e_oed_ref: 28.5e3,
+        ..dense
+    });
     assert!(
         refusal(SoilParameters {
             substeps: 1.5,
