@@ -4,6 +4,8 @@
 //! into files. All loads are nodal forces, so that no program's convention for pressures or weights matters.
 
 mod calculix;
+mod columns;
+mod course;
 mod import;
 mod kratos;
 mod limits;

@@ -1,10 +1,11 @@
 //! What cannot be carried to another program: at all, or without the rest losing its meaning.
 
-use crate::model::{constant, parameters};
+use crate::model::{Held, Load, constant, parameters};
 use crate::{Error, Program, kratos, opengeosys};
 use input::Case;
 use mechanics::problem::{Drainage, ElementGroup, Formulation, Integration, Phase, Problem};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::fmt;
 use std::ops::Range;
 use text::InputError;
@@ -27,8 +28,34 @@ impl fmt::Display for NotCarried {
     }
 }
 
-/// A probe of points or of a group.
-pub(crate) fn probe(case: &Case, name: &str) -> NotCarried {
+/// Why the radial forces of a program that takes a sector of the whole turn are not those of the whole turn.
+pub(crate) const RADIAL: &str =
+    "its sector of 2° has forces on its sides, which radial reactions contain";
+
+/// Radial forces on nodes of a sector that can move, which act on its sides along its middle.
+pub(crate) fn radial_forces(case: &Case, held: &[Held], loads: &[Load]) -> Option<NotCarried> {
+    let held = held.iter().filter(|held| held.component == 0);
+    let held: BTreeSet<usize> = held.flat_map(|held| held.nodes.iter().copied()).collect();
+    let largest = |component: usize, free: bool| {
+        let all = loads
+            .iter()
+            .flat_map(|load| load.nodes.iter().zip(&load.forces));
+        let own = all.filter(|(node, _)| !free || !held.contains(node));
+        own.fold(0.0_f64, |most, (_, force)| most.max(force[component].abs()))
+    };
+    let all = largest(0, false).max(largest(1, false));
+    (largest(0, true) > ROUND_OFF * all).then(|| NotCarried {
+        place: case.source.place(&case.file.phases.first().map_or(0..0, |p| p.name.span())),
+        key: "phase".to_owned(),
+        reason: "radial forces act along the middle of its sector of 2°: displacements are 1e-4 too small".to_owned(),
+    })
+}
+
+/// A force beside others that are larger by this factor is round-off.
+const ROUND_OFF: f64 = 1e-9;
+
+/// A probe that is not read back.
+pub(crate) fn probe(case: &Case, name: &str, reason: &str) -> NotCarried {
     let probes = case.file.probes.keys();
     let span = probes
         .filter(|key| key.get_ref() == name)
@@ -37,7 +64,7 @@ pub(crate) fn probe(case: &Case, name: &str) -> NotCarried {
     NotCarried {
         place: case.source.place(&span.unwrap_or(0..0)),
         key: format!("probes.{name}"),
-        reason: "only displacements and reactions of lines are read back".to_owned(),
+        reason: reason.to_owned(),
     }
 }
 

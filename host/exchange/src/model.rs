@@ -1,21 +1,16 @@
 //! A problem as plain values, as other programs take it. Units: kN, m, kPa; tension positive. Forces are of the whole
 //! turn in axisymmetry, kN/m in plane strain. Components 0 and 1 are x (r) and y (z); stresses 11 22 33 12.
 
+use crate::course::{held, loads, steps};
 use crate::limits::{self, NotCarried};
-use crate::{Error, Program};
+use crate::{Error, Program, columns};
 use input::Case;
-use input::probes;
 use law::BuiltLaw;
 use mechanics::Simulation;
 use mechanics::element::Kind;
-use mechanics::ground::Loading;
-use mechanics::problem::{
-    Analysis, Axis, ElementGroup, InitialStress, Integration, Phase, Problem,
-};
-use results::output_request::Reduce;
-use results::probe;
+use mechanics::problem::{Analysis, ElementGroup, InitialStress, Integration};
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// The problem.
@@ -175,9 +170,15 @@ impl Model {
         let mut not_carried = limits::check(case, &posed.problem, program)?;
         let simulation = Simulation::new(posed.problem).map_err(|error| case.place(error))?;
         let problem = simulation.problem();
-        let (probes, left) = probes_of(case, &simulation)?;
+        let axisymmetric = problem.analysis == Analysis::Axisymmetric;
+        let of_sector = program == Program::Calculix && axisymmetric;
+        let (probes, left) = columns::of(case, &simulation, of_sector)?;
         not_carried.extend(left);
         let held = held(problem);
+        let loads = loads(&simulation, &held, program);
+        if of_sector {
+            not_carried.extend(limits::radial_forces(case, &held, &loads));
+        }
         let steps = steps(problem);
         let solids = problem.mesh.solids.iter();
         Ok(Self {
@@ -185,7 +186,7 @@ impl Model {
             case: case.name(),
             variant: case.variant.clone(),
             title: case.file.title.clone(),
-            axisymmetric: problem.analysis == Analysis::Axisymmetric,
+            axisymmetric,
             nodes: problem.mesh.nodes.clone(),
             elements: solids
                 .map(|solid| Element {
@@ -194,7 +195,7 @@ impl Model {
                 })
                 .collect(),
             groups: problem.groups.iter().map(Group::of).collect(),
-            loads: loads(&simulation, &held, program),
+            loads,
             held,
             steps,
             probes,
@@ -268,256 +269,4 @@ pub(crate) fn parameters(built: &BuiltLaw) -> Vec<Parameter> {
         by_default: used.by_default,
     };
     declared.zip(&built.parameters).map(of).collect()
-}
-
-/// Shares of the time of a phase at the ends of its increments.
-fn shares(phase: &Phase) -> impl Iterator<Item = f64> + use<> {
-    let n = phase.increments;
-    (1..=n).map(move |k| k as f64 / n as f64)
-}
-
-/// Factor on the changes of a phase after a share of its time.
-fn factor(phase: &Phase, share: f64) -> f64 {
-    let course = &phase.course;
-    let after = course.iter().position(|[time, _]| *time >= share);
-    match (after, course.last()) {
-        (Some(i), _) if i > 0 => {
-            let ([t_0, f_0], [t_1, f_1]) = (course[i - 1], course[i]);
-            f_0 + (share - t_0) / (t_1 - t_0) * (f_1 - f_0)
-        }
-        (Some(i), _) => course[i][1],
-        (None, Some(last)) => last[1],
-        (None, None) => share,
-    }
-}
-
-fn steps(problem: &Problem) -> Vec<Step> {
-    let mut steps: Vec<Step> = Vec::new();
-    let (mut start, mut counted_from) = (0.0, None);
-    for phase in &problem.phases {
-        if phase.reset_displacements {
-            counted_from = steps.len().checked_sub(1);
-        }
-        for (share, increment) in shares(phase).zip(1..) {
-            steps.push(Step {
-                phase: phase.name.clone(),
-                increment,
-                time: start + share * phase.length(),
-                counted_from,
-            });
-        }
-        start += phase.length();
-    }
-    steps
-}
-
-/// Displacements of supports and of all phases.
-fn held(problem: &Problem) -> Vec<Held> {
-    let mut lines: BTreeMap<(usize, &str, usize), Vec<f64>> = BTreeMap::new();
-    let n = problem.phases.iter().map(|phase| phase.increments).sum();
-    let number = |axis: Axis| usize::from(axis == Axis::Y);
-    for (order, support) in problem.supports.iter().enumerate() {
-        for axis in &support.fixed {
-            lines.insert((order, &support.line, number(*axis)), vec![0.0; n]);
-        }
-    }
-    let order = problem.supports.len();
-    let mut done = 0;
-    // Values by line since the start, and where their count starts.
-    let mut now: BTreeMap<(&str, usize), [f64; 2]> = BTreeMap::new();
-    for phase in &problem.phases {
-        if phase.reset_displacements {
-            now.values_mut()
-                .for_each(|[value, origin]| *origin = *value);
-        }
-        let start = now.clone();
-        for given in &phase.displacement {
-            for (component, value) in [given.x, given.y].into_iter().enumerate() {
-                if let Some(value) = value {
-                    let [total, origin] = now.entry((&given.line, component)).or_default();
-                    *total = *origin + value;
-                }
-            }
-        }
-        for (&(line, component), [end, _]) in &now {
-            let from = start
-                .get(&(line, component))
-                .map_or(0.0, |[value, _]| *value);
-            let values = lines
-                .entry((order, line, component))
-                .or_insert_with(|| vec![0.0; n]);
-            for (value, share) in values[done..].iter_mut().zip(shares(phase)) {
-                *value = from + factor(phase, share) * (end - from);
-            }
-        }
-        done += phase.increments;
-        for (key, held) in &mut now {
-            if let Some(values) = lines.get(&(order, key.0, key.1)) {
-                held[0] = values[done - 1];
-            }
-        }
-    }
-    let mut taken = BTreeSet::new();
-    // What a phase says counts more than a support.
-    let all = lines
-        .into_iter()
-        .rev()
-        .map(|((_, line, component), values)| {
-            let nodes = problem.mesh.lines.get(line).into_iter();
-            let nodes = nodes.flat_map(|line| line.nodes.iter().copied());
-            Held {
-                line: line.to_owned(),
-                component,
-                nodes: nodes
-                    .filter(|&node| taken.insert((node, component)))
-                    .collect(),
-                values,
-            }
-        });
-    let mut all: Vec<Held> = all.filter(|held| !held.nodes.is_empty()).collect();
-    all.reverse();
-    all
-}
-
-/// Nodal forces: those before the first phase, what each phase changes, and what the initial stress lacks to balance
-/// them, which the first phase takes away.
-fn loads(simulation: &Simulation, held: &[Held], program: Program) -> Vec<Load> {
-    let problem = simulation.problem();
-    let n_dofs = 2 * problem.mesh.nodes.len();
-    let mut internal = vec![0.0; n_dofs];
-    for group in simulation.groups() {
-        let own = group.forces(n_dofs);
-        internal
-            .iter_mut()
-            .zip(own)
-            .for_each(|(sum, own)| *sum += own);
-    }
-    let n: usize = problem.phases.iter().map(|phase| phase.increments).sum();
-    let mut loading = Loading::before(problem);
-    let mut acting = loading.forces(problem, simulation.groups());
-    let always = vec![1.0; n + 1];
-    let mut loads = Vec::new();
-    let mut lacking: Vec<f64> = internal.iter().zip(&acting).map(|(a, b)| a - b).collect();
-    for held in held {
-        held.nodes
-            .iter()
-            .for_each(|node| lacking[2 * node + held.component] = 0.0);
-    }
-    loads.push(Load::of(
-        "before the first phase",
-        true,
-        &acting,
-        always.clone(),
-    ));
-    if let Some(first) = problem.phases.first() {
-        let mut factors = vec![0.0; n + 1];
-        factors[0] = 1.0;
-        for (factor, share) in factors[1..].iter_mut().zip(shares(first)) {
-            *factor = 1.0 - share;
-        }
-        loads.push(Load::of(
-            "balance of the initial stress",
-            false,
-            &lacking,
-            factors,
-        ));
-    }
-    if program.starts_free_of_stress() {
-        let against: Vec<f64> = internal.iter().map(|force| -force).collect();
-        loads.push(Load::of("initial stress", true, &against, always));
-    }
-    let mut done = 0;
-    for phase in &problem.phases {
-        loading = loading.changed_by(phase);
-        let next = loading.forces(problem, simulation.groups());
-        let change: Vec<f64> = next.iter().zip(&acting).map(|(a, b)| a - b).collect();
-        let mut factors = vec![0.0; done + 1];
-        factors.extend(shares(phase).map(|share| factor(phase, share)));
-        let last = factors.last().copied().unwrap_or_default();
-        factors.resize(n + 1, last);
-        loads.push(Load::of(&phase.name, true, &change, factors));
-        acting = next;
-        done += phase.increments;
-    }
-    loads.retain(|load| !load.nodes.is_empty());
-    loads
-}
-
-impl Load {
-    /// The forces that are not 0, of forces by degree of freedom.
-    fn of(name: &str, is_external: bool, forces: &[f64], factors: Vec<f64>) -> Self {
-        let pairs = forces.chunks_exact(2).map(|pair| [pair[0], pair[1]]);
-        let acts = |(_, force): &(usize, [f64; 2])| force.iter().any(|force| *force != 0.0);
-        let (nodes, forces) = pairs.enumerate().filter(acts).unzip();
-        Self {
-            name: name.to_owned(),
-            is_external,
-            nodes,
-            forces,
-            factors,
-        }
-    }
-}
-
-/// Probes at nodes, and those that are not carried.
-fn probes_of(case: &Case, simulation: &Simulation) -> Result<(Vec<Probe>, Vec<NotCarried>), Error> {
-    let resolved = probes::resolve(case, simulation)?;
-    let (mut carried, mut left): (Vec<Probe>, Vec<NotCarried>) = (Vec::new(), Vec::new());
-    let names: Vec<&str> = resolved.names().collect();
-    for (name, probe) in resolved.iter() {
-        let quantity = match probe {
-            probe::Probe::Displacement {
-                nodes,
-                component,
-                reduce,
-                scale,
-            } => Some(Quantity::Displacement(AtNodes {
-                nodes: nodes.clone(),
-                component: *component,
-                reduce: word(*reduce).to_owned(),
-                scale: *scale,
-            })),
-            probe::Probe::Force {
-                nodes,
-                component,
-                group: None,
-                scale,
-                ..
-            } => Some(Quantity::Reaction(AtNodes {
-                nodes: nodes.clone(),
-                component: *component,
-                reduce: "sum".to_owned(),
-                scale: *scale,
-            })),
-            probe::Probe::Combination(terms) => {
-                let named = terms
-                    .iter()
-                    .map(|&(i, factor)| (names[i].to_owned(), factor));
-                let named: Vec<(String, f64)> = named.collect();
-                let is_there = |(name, _): &(String, f64)| carried.iter().any(|p| p.name == *name);
-                named
-                    .iter()
-                    .all(is_there)
-                    .then_some(Quantity::Combination(named))
-            }
-            _ => None,
-        };
-        match quantity {
-            Some(quantity) => carried.push(Probe {
-                name: name.to_owned(),
-                quantity,
-            }),
-            None => left.push(limits::probe(case, name)),
-        }
-    }
-    Ok((carried, left))
-}
-
-fn word(reduce: Reduce) -> &'static str {
-    match reduce {
-        Reduce::Min => "min",
-        Reduce::Max => "max",
-        Reduce::Sum => "sum",
-        Reduce::Mean | Reduce::Average | Reduce::Integral => "mean",
-    }
 }

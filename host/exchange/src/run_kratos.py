@@ -32,9 +32,10 @@ def properties(part, number, group):
                         ("IGNORE_UNDRAINED", True)):
         table[variable(name)] = value
     table[km.DYNAMIC_VISCOSITY] = 1e-6
-    values = [parameter["value"] for parameter in group["parameters"]]
-    while values and values[-1] is None:
-        values.pop()
+    parameters = list(group["parameters"])
+    while parameters and parameters[-1]["by_default"]:
+        parameters.pop()
+    values = [parameter["value"] for parameter in parameters]
     if None in values:
         sys.exit(f"law {group['law']}: a parameter in the middle is left out, which Kratos cannot pass on")
     table[variable("UDSM_NAME")] = group["library"]
