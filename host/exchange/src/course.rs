@@ -94,8 +94,9 @@ fn add_phases<'p>(problem: &'p Problem, courses: &mut Courses<'p>) {
     let mut now: BTreeMap<(&str, usize), [f64; 2]> = BTreeMap::new();
     for phase in &problem.phases {
         if phase.reset_displacements {
-            now.values_mut()
-                .for_each(|[value, origin]| *origin = *value);
+            for [value, origin] in now.values_mut() {
+                *origin = *value;
+            }
         }
         let start = now.clone();
         for given in &phase.displacement {

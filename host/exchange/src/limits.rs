@@ -1,6 +1,6 @@
 //! What cannot be carried to another program: at all, or without the rest losing its meaning.
 
-use crate::model::{Held, Load, constant, parameters};
+use crate::model::{Held, Load, Parameter, constant, parameters};
 use crate::{Error, Program, kratos, opengeosys};
 use input::Case;
 use mechanics::problem::{Drainage, ElementGroup, Formulation, Integration, Phase, Problem};
@@ -173,15 +173,14 @@ impl Check<'_> {
                 let set = parameters
                     .iter()
                     .find(|p| p.may_be_left_out && !p.by_default);
-                if !exports(library.path(), &symbol) {
-                    Some(format!("law `{id}`, whose library has no `{symbol}`,"))
+                let of_parameter = |set: &Parameter| {
+                    let id_of = &set.id;
+                    format!("parameter `{id_of}`, which is not required by law `{id}`,")
+                };
+                if exports(library.path(), &symbol) {
+                    set.map(of_parameter)
                 } else {
-                    set.map(|set| {
-                        format!(
-                            "parameter `{}`, which is not required by law `{id}`,",
-                            set.id
-                        )
-                    })
+                    Some(format!("law `{id}`, whose library has no `{symbol}`,"))
                 }
             }
             Program::Kratos => (!exports(library.path(), kratos::SYMBOL))

@@ -88,10 +88,8 @@ fn project(model: &Model) -> String {
             .map(|(n, held)| held_mesh(n, held)),
     );
     meshes.extend((0..model.loads.len()).map(|n| format!("load_{n}")));
-    let meshes: String = meshes
-        .iter()
-        .map(|name| format!("    <mesh{axial}>{name}.vtu</mesh>\n"))
-        .collect();
+    let line = |name: String| format!("    <mesh{axial}>{name}.vtu</mesh>\n");
+    let meshes = meshes.into_iter().map(line).collect::<Vec<_>>().concat();
     let order = if model.groups.first().is_some_and(|group| group.reduced) {
         2
     } else {
@@ -142,12 +140,11 @@ fn project(model: &Model) -> String {
 }
 
 fn relation((number, group): (usize, &Group)) -> String {
-    let properties: String = required(group)
-        .map(|(id, _)| {
-            let name = camel(id);
-            format!("\n        <material_property name=\"{name}\" parameter=\"{number}_{id}\"/>")
-        })
-        .collect();
+    let property = |(id, _): (&str, f64)| {
+        let name = camel(id);
+        format!("\n        <material_property name=\"{name}\" parameter=\"{number}_{id}\"/>")
+    };
+    let properties = required(group).map(property).collect::<Vec<_>>().concat();
     format!(
         "    <constitutive_relation id=\"{number}\"><type>MFront</type><behaviour>{}</behaviour>\n      \
          <library>{}</library>\n      <material_properties>{properties}\n      </material_properties>\n    \

@@ -100,7 +100,7 @@ pub(crate) fn array(text: &str, name: &str) -> Option<Vec<f64>> {
         4
     };
     // The length may be encoded by itself, with its own padding.
-    let own = (length + 2) / 3 * 4;
+    let own = usize::div_ceil(length, 3) * 4;
     let bytes = if content.get(..own)?.ends_with('=') {
         decoded(&content[own..])?
     } else {
