@@ -59,6 +59,16 @@ pub(crate) enum Command {
     },
     /// Show what a mesh has before a case exists: elements, groups, lines, shapes, what is refused.
     Mesh(Mesh),
+    /// Write a case as input of another program, run there; `pilum import` reads its results.
+    Export(Export),
+    /// Read the results of a program that a case was exported to, as a table like that of a run.
+    Import {
+        /// The folder of the export, where the program ran.
+        folder: PathBuf,
+        /// Folder for `history.csv` and `summary.json` [default: the same].
+        #[arg(long)]
+        out: Option<PathBuf>,
+    },
     /// Measure error against CPU time for many settings of a case or driver.
     TradeOff(TradeOff),
     /// Find parameters of laws from measured curves, with intervals.
@@ -239,6 +249,26 @@ pub(crate) struct Mesh {
     pub(crate) draw: Option<PathBuf>,
 }
 
+/// Arguments of `pilum export`.
+#[derive(Args)]
+pub(crate) struct Export {
+    /// A case file, or a folder with `case.toml`.
+    pub(crate) case: PathBuf,
+    /// The program.
+    #[arg(long)]
+    pub(crate) to: exchange::Program,
+    /// The variant, if the case has several.
+    #[arg(long)]
+    pub(crate) variant: Option<String>,
+    /// Override a setting of the file and its variants: KEY is the dotted path, VALUE as in the
+    /// file, such as `solver.max_iterations=40`; may be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub(crate) set: Vec<String>,
+    /// Folder for the files [default: `results/CASE_PROGRAM`].
+    #[arg(long)]
+    pub(crate) out: Option<PathBuf>,
+}
+
 /// Arguments of `pilum trade-off`.
 #[derive(Args)]
 #[expect(
@@ -311,9 +341,11 @@ impl Command {
             }
             // One run goes on from its checkpoint.
             Self::Study(Study { run, .. }) => Some(run.is_some()),
-            Self::TradeOff(_) | Self::Calibrate(_) | Self::Laws { .. } | Self::Lock { .. } => {
-                Some(false)
-            }
+            Self::TradeOff(_)
+            | Self::Calibrate(_)
+            | Self::Export(_)
+            | Self::Laws { .. }
+            | Self::Lock { .. } => Some(false),
             _ => None,
         }
     }

@@ -1,6 +1,7 @@
 //! The commands: calls of the rooms, and their output.
 
 mod cases;
+mod exchanges;
 mod meshes;
 mod studies;
 
@@ -31,6 +32,8 @@ pub(crate) fn execute(command: Command, opener: Opener) -> Result<(), Error> {
         } => write_report(&folders, out, print),
         Command::Table { folders, out } => write_table(&folders, out.as_deref()),
         Command::Mesh(asked) => meshes::show(&asked),
+        Command::Export(asked) => exchanges::export(&asked, &opener),
+        Command::Import { folder, out } => exchanges::import(&folder, out.as_deref()),
         Command::TradeOff(asked) => study_settings(asked, opener),
         Command::Calibrate(asked) => calibrate(asked, opener),
         Command::Check(arguments) => {

@@ -389,6 +389,7 @@ how_to! {
     how_to_compute_a_pile_by_load_transfer: "tz-pile",
     how_to_debug_a_law: "debug-a-law",
     how_to_come_from_other_programs: "coming-from",
+    how_to_exchange_cases: "exchange",
 }
 
 /// Columns of tables are those that a run writes.

@@ -7,6 +7,7 @@
 
 mod distributed;
 mod entries;
+mod exchange;
 mod kratos;
 mod mfront;
 mod opengeosys;
@@ -41,6 +42,8 @@ fn a_missing_program_is_named() {
         ("opengeosys::elastic_gives_our_stresses", "opengeosys"),
         ("mfront::other_behaviours_of_opengeosys_run", "opengeosys"),
         ("kratos::mohr_coulomb_gives_our_head_force", "kratos"),
+        ("exchange::opengeosys_gives_our_table", "opengeosys"),
+        ("exchange::kratos_gives_our_table", "kratos"),
         (
             "salib::indices_of_the_ishigami_function_are_those_of_salib",
             "salib",

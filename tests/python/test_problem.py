@@ -135,6 +135,25 @@ def test_meshio_comes_to_the_same_bits(tmp_path: Path) -> None:
     np.testing.assert_allclose(pushed(pilum.Problem(from_file).start()), expected, rtol=1e-9)
 
 
+@pytest.mark.parametrize("ending", ["vtu", "med", "msh"])
+def test_meshes_are_written_and_read(tmp_path: Path, ending: str) -> None:
+    pytest.importorskip("meshio")
+    if ending == "med":
+        pytest.importorskip("h5py")
+    mesh = slice_mesh()
+    mesh.write(tmp_path / f"slice.{ending}")
+    again = pilum.Mesh.read(tmp_path / f"slice.{ending}")
+
+    def nodes_of(parts: dict[str, list[np.ndarray]]) -> dict[str, list[list[int]]]:
+        return {name: sorted(np.concatenate(blocks).tolist()) for name, blocks in parts.items()}
+
+    assert nodes_of(again.groups) == nodes_of(mesh.groups)
+    assert nodes_of(again.lines) == nodes_of(mesh.lines)
+    np.testing.assert_array_equal(np.asarray(again.nodes)[:, :2], mesh.nodes)
+    with pytest.raises(pilum.InputError, match="XDMF with cells of several kinds"):
+        mesh.write(tmp_path / "slice.xdmf")
+
+
 def test_meshio_keeps_names_of_entities_that_are_turned_round(tmp_path: Path) -> None:
     """Format 4.1 writes the number of a physical curve with a minus where it is drawn the other way round."""
     meshio = pytest.importorskip("meshio")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -116,7 +118,8 @@ class Mesh:
 
     @classmethod
     def from_meshio(cls, mesh: Any) -> Mesh:
-        """A mesh of meshio: groups and lines by `cell_sets`, or by Gmsh's physical names."""
+        """A mesh of meshio: groups and lines by `cell_sets`, Gmsh's physical names, MED's families, or the names of cell
+        data that meshio makes of `cell_sets` in VTU and XDMF."""
         groups: dict[str, list[Any]] = {}
         lines: dict[str, list[Any]] = {}
         names = {(int(dim), int(tag)): name for name, (tag, dim) in mesh.field_data.items()}
@@ -140,12 +143,71 @@ class Mesh:
                     name = names.get((dim, int(tag)), str(tag))
                     chosen, known = np.flatnonzero(of_block == tag), sets.get(name, np.arange(0))
                     sets[name] = np.concatenate([known, np.setdiff1d(chosen, known)])
+            for name, chosen in (*_families(mesh, number), *_joined(mesh, number, sets)):
+                sets.setdefault(name, chosen)
             for name, chosen in sets.items():
                 if len(chosen):
                     to.setdefault(name, []).append(np.asarray(block.data)[chosen])
         if not groups:
             raise InputError("the mesh has no named groups of cells: `cell_sets`, or physical names")
         return cls(mesh.points, groups, lines)
+
+    @classmethod
+    def read(cls, path: str | PathLike[str]) -> Mesh:
+        """A mesh of a file that meshio reads, such as VTU, XDMF, MED, or Gmsh's."""
+        return cls.from_meshio(_meshio().read(path))
+
+    def write(self, path: str | PathLike[str]) -> None:
+        """Writes a file that `read` takes: `.msh` in Gmsh's format 2.2, which a case takes as well, any other by meshio."""
+        if Path(path).suffix == ".msh":
+            Path(path).write_bytes(self._content())
+            return
+        mesh = self.to_meshio()
+        names = list(mesh.cell_sets)
+        # A cell is in one group or line.
+        numbers = [np.full(len(block.data), -1, dtype=np.int64) for block in mesh.cells]
+        for number, name in enumerate(names):
+            for of_block, chosen in zip(numbers, mesh.cell_sets[name]):
+                of_block[chosen] = number
+        mesh.cell_sets = {}
+        if Path(path).suffix == ".med":
+            # A family has a number below 0, and its name.
+            mesh.cell_tags = {-1 - number: [name] for number, name in enumerate(names)}
+            mesh.cell_data = {"cell_tags": [-1 - of_block for of_block in numbers]}
+        elif any("-" in name or " " in name for name in names):
+            raise InputError("a name with `-` or a blank is not read back from this format", hint="`.msh` takes any")
+        elif Path(path).suffix == ".xdmf" and len(mesh.cells) > 1:
+            kinds = ", ".join(block.type for block in mesh.cells)
+            raise InputError(f"meshio 5.3.5 cannot read XDMF with cells of several kinds, found {kinds}")
+        else:
+            mesh.cell_data = {"-".join(names): numbers}
+        mesh.write(path)
+
+    def to_meshio(self) -> Any:
+        """The mesh for meshio: a block of cells for each kind, groups and lines by `cell_sets`."""
+        kinds = {(dim, n): kind for kind, (n, dim) in _MESHIO.items()}
+        blocks: dict[str, list[NDArray[np.int64]]] = {}
+        places: list[tuple[str, str, NDArray[np.int64]]] = []
+        for parts_of, dimension in ((self.groups, 2), (self.lines, 1)):
+            for name, parts in parts_of.items():
+                for part in parts:
+                    kind = kinds[min(dimension, part.shape[1] - 1), part.shape[1]]
+                    block = blocks.setdefault(kind, [])
+                    done = sum(map(len, block))
+                    block.append(part)
+                    places.append((name, kind, np.arange(done, done + len(part))))
+        none = np.arange(0)
+        sets = {
+            name: [
+                np.concatenate([none, *(own for other, of, own in places if (other, of) == (name, kind))])
+                for kind in blocks
+            ]
+            for name in dict.fromkeys(name for name, _, _ in places)
+        }
+        nodes = np.zeros((len(self.nodes), 3))
+        nodes[:, : self.nodes.shape[1]] = self.nodes
+        cells = [(kind, np.concatenate(parts)) for kind, parts in blocks.items()]
+        return _meshio().Mesh(nodes, cells, cell_sets=sets)
 
     def name_line(self, name: str, where: Callable[[Any, Any], Any]) -> None:
         """Names the line of the edges whose ends and middle fulfil a condition.
@@ -212,6 +274,35 @@ class Mesh:
         groups = ", ".join(f"{name} ({_count(parts)})" for name, parts in self.groups.items())
         lines = ", ".join(f"{name} ({_count(parts)})" for name, parts in self.lines.items())
         return f"<pilum.Mesh: {len(self.nodes)} nodes; groups {groups}; lines {lines}>"
+
+
+def _meshio() -> Any:
+    try:
+        import meshio
+    except ImportError:
+        raise InputError("meshio is not installed", hint="pip install meshio; MED and XDMF need h5py, too") from None
+    return meshio
+
+
+def _families(mesh: Any, number: int) -> Iterator[tuple[str, NDArray[np.int64]]]:
+    """Names of MED's families in a block, with its cells."""
+    tags = mesh.cell_data.get("cell_tags")
+    for tag, names in (getattr(mesh, "cell_tags", None) or {}).items():
+        for name in names if tags is not None else ():
+            yield name, np.flatnonzero(np.asarray(tags[number]) == tag)
+
+
+def _joined(mesh: Any, number: int, sets: Mapping[str, Any]) -> Iterator[tuple[str, NDArray[np.int64]]]:
+    """What meshio makes of `cell_sets` in files that have none: a number for each, and all names as that of the data."""
+    for key, data in mesh.cell_data.items():
+        values, names = np.asarray(data[number]), key.split("-")
+        is_number = values.dtype.kind in "iu" and values.ndim == 1
+        if sets or ":" in key or key == "cell_tags" or not is_number:
+            continue
+        all_values = np.concatenate([np.asarray(part) for part in data])
+        if len(names) == len(np.unique(all_values[all_values >= 0])):
+            for index, name in enumerate(names):
+                yield name, np.flatnonzero(values == index)
 
 
 def _array(name: str, values: Any) -> NDArray[Any]:

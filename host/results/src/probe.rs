@@ -104,6 +104,13 @@ impl Probes {
         self.probes.iter().map(|(name, _)| name.as_str())
     }
 
+    /// Probes with their names, in order.
+    pub fn iter(&self) -> impl Iterator<Item = (&str, &Probe)> {
+        self.probes
+            .iter()
+            .map(|(name, probe)| (name.as_str(), probe))
+    }
+
     /// Narrows forces of groups at nodes to the elements that may have a part in them.
     pub fn narrow(&mut self, simulation: &Simulation) {
         for (_, probe) in &mut self.probes {

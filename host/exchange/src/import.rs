@@ -1,0 +1,230 @@
+//! Results of another program as a table like that of a run.
+
+use crate::model::{AtNodes, Model, Quantity};
+use crate::{Error, MODEL, Program, calculix, kratos, opengeosys, vtu};
+use results::number;
+use serde_json::{Map, Value, json};
+use std::io;
+use std::path::{Path, PathBuf};
+use text::write::replace;
+
+/// What a program found at the end of a step, by node.
+struct Found {
+    /// Since the start, m.
+    displacement: Vec<[f64; 2]>,
+    /// Internal less external forces.
+    reaction: Reaction,
+}
+
+/// Forces on nodes.
+enum Reaction {
+    /// Internal forces: external ones are still in them.
+    Internal(Vec<[f64; 2]>),
+    /// Internal less external ones.
+    Less(Vec<[f64; 2]>),
+}
+
+/// Reads what the program that a folder was written for has left there, and writes `history.csv` and `summary.json`
+/// next to it or into another folder, which is returned.
+///
+/// # Errors
+/// [`text::Error::Unreadable`] without `model.json` or results; [`text::Error::Unwritable`].
+pub fn import(folder: &Path, out: Option<&Path>) -> Result<PathBuf, Error> {
+    let path = folder.join(MODEL);
+    let model: Model = serde_json::from_str(&read(&path)?)
+        .map_err(|error| unreadable(&path, error.to_string()))?;
+    let found = match model.program {
+        Program::Ogs => of_opengeosys(folder, &model),
+        Program::Kratos => of_kratos(folder, &model),
+        Program::Calculix => of_calculix(folder, &model),
+    }?;
+    let rows: Vec<Vec<f64>> = (0..found.len())
+        .map(|step| row(&model, &found, step))
+        .collect();
+    let out = out.unwrap_or(folder);
+    std::fs::create_dir_all(out).map_err(|error| text::Error::unwritable(out, error))?;
+    let table = table(&model, &rows).map_err(|error| Error::internal(error.to_string()))?;
+    replace(&out.join("history.csv"), table)?;
+    let last = rows.last().into_iter().flatten();
+    let probes = model.probes.iter().zip(last);
+    let probes: Map<String, Value> = probes.map(|(p, v)| (p.name.clone(), json!(v))).collect();
+    let summary = json!({
+        "program": model.program.name(),
+        "status": "done",
+        "case": model.case,
+        "variant": model.variant,
+        "title": model.title,
+        "analysis": if model.axisymmetric { "axisymmetric" } else { "plane_strain" },
+        "probes": probes,
+    });
+    replace(&out.join("summary.json"), format!("{summary:#}\n"))?;
+    Ok(out.to_owned())
+}
+
+fn read(path: &Path) -> Result<String, Error> {
+    // Binary parts of a file are no text, but are not looked at.
+    let bytes = std::fs::read(path);
+    let bytes = bytes.map_err(|source| text::Error::Unreadable {
+        path: path.to_owned(),
+        source,
+    })?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+fn unreadable(path: &Path, why: impl Into<String>) -> Error {
+    let source = io::Error::new(io::ErrorKind::InvalidData, why.into());
+    text::Error::Unreadable {
+        path: path.to_owned(),
+        source,
+    }
+    .into()
+}
+
+fn of_opengeosys(folder: &Path, model: &Model) -> Result<Vec<Found>, Error> {
+    let step = |number: usize| {
+        let path = folder.join(format!("{}_{}.vtu", opengeosys::RESULTS, number + 1));
+        let text = read(&path)?;
+        let pairs = |name: &str| {
+            let values = vtu::array(&text, name).filter(|all| all.len() == 2 * model.nodes.len());
+            let values = values
+                .ok_or_else(|| unreadable(&path, format!("no array `{name}` of every node")))?;
+            Ok::<_, Error>(
+                values
+                    .chunks_exact(2)
+                    .map(|pair| [pair[0], pair[1]])
+                    .collect(),
+            )
+        };
+        Ok(Found {
+            displacement: pairs("displacement")?,
+            reaction: Reaction::Internal(pairs("NodalForces")?),
+        })
+    };
+    (0..model.steps.len()).map(step).collect()
+}
+
+fn of_kratos(folder: &Path, model: &Model) -> Result<Vec<Found>, Error> {
+    let path = folder.join(kratos::RESULTS);
+    let n = model.nodes.len();
+    let mut all = vec![[vec![[0.0; 2]; n], vec![[0.0; 2]; n]]; model.steps.len()];
+    let text = read(&path)?;
+    let mut count = 0;
+    for line in text.lines().skip(1) {
+        let numbers: Option<Vec<f64>> = line.split(',').map(|word| word.parse().ok()).collect();
+        let Some(&[step, node, u, v, r, s]) = numbers.as_deref() else {
+            return Err(unreadable(&path, format!("no six numbers in `{line}`")));
+        };
+        let place = all.get_mut(step as usize).filter(|_| (node as usize) < n);
+        let [displacement, reaction] = place.ok_or_else(|| unreadable(&path, "another model's"))?;
+        displacement[node as usize] = [u, v];
+        reaction[node as usize] = [r, s];
+        count += 1;
+    }
+    if count != n * model.steps.len() {
+        return Err(unreadable(
+            &path,
+            "not every node of every increment is there",
+        ));
+    }
+    let found = |[displacement, reaction]: [Vec<[f64; 2]>; 2]| Found {
+        displacement,
+        reaction: Reaction::Less(reaction),
+    };
+    Ok(all.into_iter().map(found).collect())
+}
+
+fn of_calculix(folder: &Path, model: &Model) -> Result<Vec<Found>, Error> {
+    let path = folder.join("model.dat");
+    let [displacements, forces] = calculix::printed(&read(&path)?, model.nodes.len());
+    if displacements.len() != model.steps.len() || forces.len() != model.steps.len() {
+        return Err(unreadable(&path, "not every increment is there"));
+    }
+    let factor = if model.axisymmetric {
+        calculix::SECTORS
+    } else {
+        1.0
+    };
+    let found = |(displacement, mut forces): (Vec<[f64; 2]>, Vec<[f64; 2]>)| {
+        forces
+            .iter_mut()
+            .flatten()
+            .for_each(|force| *force *= factor);
+        Found {
+            displacement,
+            reaction: Reaction::Internal(forces),
+        }
+    };
+    Ok(displacements.into_iter().zip(forces).map(found).collect())
+}
+
+/// Values of the probes at the end of a step.
+fn row(model: &Model, found: &[Found], step: usize) -> Vec<f64> {
+    let mut row: Vec<f64> = Vec::new();
+    for probe in &model.probes {
+        let value = match &probe.quantity {
+            Quantity::Displacement(at) => displacement(model, found, step, at),
+            Quantity::Reaction(at) => reaction(model, found, step, at),
+            Quantity::Combination(terms) => {
+                let value = |(name, factor): &(String, f64)| {
+                    let place = model.probes.iter().position(|probe| probe.name == *name);
+                    place.and_then(|i| row.get(i)).map(|value| factor * value)
+                };
+                terms.iter().filter_map(value).sum()
+            }
+        };
+        row.push(value);
+    }
+    row
+}
+
+fn displacement(model: &Model, found: &[Found], step: usize, at: &AtNodes) -> f64 {
+    let from = model.steps[step].counted_from;
+    let value = |&node: &usize| {
+        let origin = from.map_or(0.0, |from| found[from].displacement[node][at.component]);
+        found[step].displacement[node][at.component] - origin
+    };
+    let values: Vec<f64> = at.nodes.iter().map(value).collect();
+    let sum: f64 = values.iter().sum();
+    at.scale
+        * match at.reduce.as_str() {
+            "min" => values.iter().copied().fold(f64::INFINITY, f64::min),
+            "max" => values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            "sum" => sum,
+            _ => sum / values.len() as f64,
+        }
+}
+
+fn reaction(model: &Model, found: &[Found], step: usize, at: &AtNodes) -> f64 {
+    let sum = |forces: &[[f64; 2]]| {
+        at.nodes
+            .iter()
+            .map(|&node| forces[node][at.component])
+            .sum::<f64>()
+    };
+    at.scale
+        * match &found[step].reaction {
+            Reaction::Less(forces) => sum(forces),
+            Reaction::Internal(forces) => sum(forces) - model.external(step, at),
+        }
+}
+
+fn table(model: &Model, rows: &[Vec<f64>]) -> Result<Vec<u8>, csv::Error> {
+    let mut table = csv::Writer::from_writer(Vec::new());
+    let header = ["phase", "increment", "time"].into_iter();
+    let header = header.chain(model.probes.iter().map(|p| p.name.as_str()));
+    table.write_record(header.chain(["iterations"]))?;
+    for (step, row) in model.steps.iter().zip(rows) {
+        let place = [
+            step.phase.clone(),
+            step.increment.to_string(),
+            number(step.time),
+        ];
+        let row = place
+            .into_iter()
+            .chain(row.iter().map(|value| number(*value)));
+        table.write_record(row.chain([String::new()]))?;
+    }
+    table
+        .into_inner()
+        .map_err(|error| error.into_error().into())
+}
