@@ -78,6 +78,7 @@ pub(crate) fn check(case: &Case, problem: &Problem, to: Program) -> Result<Vec<N
         return Err(check.refuse(water.span(), "water", "pore water").into());
     }
     for (number, group) in problem.groups.iter().enumerate() {
+        check.elements(number, problem)?;
         check.group(number, group)?;
     }
     let mut held = Vec::new();
@@ -97,6 +98,19 @@ impl Check<'_> {
     fn refuse(&self, span: Range<usize>, key: &str, what: &str) -> InputError {
         let message = format!("{key}: {what} cannot be carried to {}", self.to.name());
         self.case.source.error(span, message)
+    }
+
+    /// CalculiX has no plane element of nine nodes.
+    fn elements(&self, number: usize, problem: &Problem) -> Result<(), InputError> {
+        let mut own = problem.mesh.solids.iter().filter(|s| s.group == number);
+        let known = self.to != Program::Calculix || own.all(|solid| solid.nodes().len() < 9);
+        match self.case.file.groups.get_index(number) {
+            Some((name, _)) if !known => {
+                let key = format!("groups.{}", name.get_ref());
+                Err(self.refuse(name.span(), &key, "an element of nine nodes"))
+            }
+            _ => Ok(()),
+        }
     }
 
     fn group(&self, number: usize, group: &ElementGroup) -> Result<(), InputError> {

@@ -104,7 +104,7 @@ pub(crate) fn array(text: &str, name: &str) -> Option<Vec<f64>> {
     let bytes = if content.get(..own)?.ends_with('=') {
         decoded(&content[own..])?
     } else {
-        decoded(content)?.split_off(length)
+        decoded(content)?.get(length..)?.to_vec()
     };
     let numbers = bytes
         .chunks_exact(8)

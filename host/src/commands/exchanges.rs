@@ -11,13 +11,11 @@ pub(super) fn export(asked: &Export, opener: &Opener) -> Result<(), Error> {
     let mut cases = Case::load_with(&asked.case, &asked.set)?;
     let variant = asked.variant.as_deref();
     variants::keep(&mut cases, variant, |case| case.variant.clone())?;
-    let case = match cases.as_slice() {
-        [case] => case.clone().opened_by(opener),
-        _ => {
-            let message = "the case has several variants: name one with --variant";
-            return Err(Error::usage(message));
-        }
+    let [case] = cases.as_slice() else {
+        let message = "the case has several variants: name one with --variant";
+        return Err(Error::usage(message));
     };
+    let case = case.clone().opened_by(opener);
     let program = asked.to;
     let folder = asked.out.clone().unwrap_or_else(|| {
         let name = format!("{}_{}", case.name(), program.name().to_lowercase());
