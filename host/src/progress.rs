@@ -10,6 +10,7 @@ use runs::run::Observer;
 use runs::supervision;
 use std::io::{IsTerminal, Write as _};
 use std::path::{Path, PathBuf};
+use text::counted;
 
 /// A bar on a terminal, plain lines elsewhere; both on the error stream.
 pub(crate) struct Progress {
@@ -66,7 +67,7 @@ impl Observer for Progress {
             bar.tick();
             self.bar = Some(bar);
         } else {
-            say!("phase {name}: {increments} increments");
+            say!("phase {name}: {}", counted(increments, "increment"));
         }
     }
 
@@ -75,14 +76,16 @@ impl Observer for Progress {
             Some(bar) => {
                 bar.set_position(place.increment as u64);
                 bar.set_message(format!(
-                    "{iterations} iterations, {} cut-backs",
-                    self.cut_backs
+                    "{}, {}",
+                    counted(iterations, "iteration"),
+                    counted(self.cut_backs, "cut-back")
                 ));
             }
             None => say!(
-                "phase {}: increment {}/{of}, {iterations} iterations",
+                "phase {}: increment {}/{of}, {}",
                 place.phase,
-                place.increment
+                place.increment,
+                counted(iterations, "iteration")
             ),
         }
     }

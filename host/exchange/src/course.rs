@@ -162,7 +162,7 @@ pub(crate) fn loads(simulation: &Simulation, held: &[Held], program: Program) ->
     loads
 }
 
-/// What each phase changes of nodal forces, which are `acting` at first.
+/// Changes of nodal forces in each phase, which are `acting` at first.
 fn changes(simulation: &Simulation, mut acting: Vec<f64>) -> Vec<Load> {
     let (problem, groups) = (simulation.problem(), simulation.groups());
     let mut loading = Loading::before(problem);

@@ -68,7 +68,7 @@ pub(crate) fn probe(case: &Case, name: &str, reason: &str) -> NotCarried {
     }
 }
 
-/// What is not carried.
+/// Keys that are left out.
 ///
 /// # Errors
 /// The first key without which the rest has no meaning.
@@ -287,7 +287,7 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// What is not carried although the rest is.
+    /// Keys that are left out, without harm to the rest.
     fn left(&self, problem: &Problem) -> Vec<NotCarried> {
         let mut left = Vec::new();
         let file = &self.case.file;

@@ -40,7 +40,7 @@ pub struct Model {
     pub loads: Vec<Load>,
     /// Columns of the table of results.
     pub probes: Vec<Probe>,
-    /// What is not carried.
+    /// Keys that are left out.
     pub not_carried: Vec<NotCarried>,
 }
 
@@ -131,11 +131,11 @@ pub struct Load {
 pub struct Probe {
     /// Its name.
     pub name: String,
-    /// What it is.
+    /// Its quantity.
     pub quantity: Quantity,
 }
 
-/// What a column is.
+/// Quantity of a column.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {

@@ -4,6 +4,7 @@ use mechanics::mesh::{Line, Mesh, Solid};
 use mechanics::problem::{Analysis, Axis};
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::{self, Display, Write};
+use text::counted;
 
 /// Ends of a line that are listed.
 const MOST_ENDS: usize = 4;
@@ -259,11 +260,6 @@ fn table<const N: usize>(
         writeln!(f, "{}", line.trim_end())?;
     }
     Ok(())
-}
-
-/// `1 quad`, `2 quads`.
-fn counted(n: usize, what: &str) -> String {
-    format!("{n} {what}{}", if n == 1 { "" } else { "s" })
 }
 
 /// Some places, and how many more there are.

@@ -23,3 +23,9 @@ pub use read::{Named, parse, parse_any_numbers};
 pub use setting::key;
 pub use source::{InputError, Line, Source};
 pub use suggest::{nearest, suggestion};
+
+/// A number with its noun: `1 quad`, `2 quads`.
+#[must_use]
+pub fn counted(n: usize, noun: &str) -> String {
+    format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
+}

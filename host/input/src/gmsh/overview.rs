@@ -15,7 +15,7 @@ use text::file;
 /// The least radius in axisymmetry is 0 within this part of the mesh's size.
 const NOTHING: f64 = 1e-9;
 
-/// What a mesh file has.
+/// Contents of a mesh file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Overview {
     /// The mesh as a case in plane strain would take it: coordinates in units of the file, a group for each physical

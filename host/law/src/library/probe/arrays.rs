@@ -243,7 +243,7 @@ impl Arrays {
         }
     }
 
-    /// What the law has written.
+    /// The output of the law.
     pub(super) fn answer(self, returned: Status) -> Answer {
         let statuses = self.status.bytes().as_chunks().0.iter();
         let points = statuses
