@@ -257,3 +257,42 @@ fn what_cannot_be_carried_is_named() {
         }
     }
 }
+
+#[test]
+fn what_is_no_equilibrium_is_not_taken_for_one() {
+    let place = tempfile::tempdir().unwrap();
+    let there = place.path();
+    let case = case(
+        &beside("block.toml"),
+        None,
+        &["groups.soil.law=\"elastic\""],
+    );
+    exchange::export(&case, Program::Kratos, there).unwrap();
+    let model: Model =
+        serde_json::from_str(&std::fs::read_to_string(there.join("model.json")).unwrap()).unwrap();
+    let free = (0..model.nodes.len())
+        .find(|node| !model.held.iter().any(|held| held.nodes.contains(node)))
+        .unwrap();
+    let mut rows = "step,node,u_0,u_1,r_0,r_1\n".to_owned();
+    for step in 0..model.steps.len() {
+        for node in 0..model.nodes.len() {
+            let force = if node == free && step == 2 { 1e6 } else { 0.0 };
+            rows += &format!("{step},{node},0,0,0,{force}\n");
+        }
+    }
+    std::fs::write(there.join("nodes.csv"), rows).unwrap();
+    let error = exchange::import(there, None).unwrap_err().to_string();
+    assert!(error.contains("are no equilibrium there"), "{error}");
+    assert_eq!(tests::case::table(&there.join("history.csv")).len(), 2);
+    let summary = std::fs::read_to_string(there.join("summary.json")).unwrap();
+    assert!(summary.contains("\"status\": \"stopped\""), "{summary}");
+    // Results of an earlier export are not read as those of a later one, and nothing else goes.
+    std::fs::write(there.join("mine.txt"), "mine").unwrap();
+    exchange::export(&case, Program::Calculix, there).unwrap();
+    let mut left: Vec<String> = std::fs::read_dir(there)
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    left.sort();
+    assert_eq!(left, ["mine.txt", "model.inp", "model.json"]);
+}

@@ -24,11 +24,16 @@ enum Reaction {
     Less(Vec<[f64; 2]>),
 }
 
+/// Forces out of balance of an equilibrium, relative to the largest nodal force: those that iterate until displacements
+/// change by 1e-10 leave far less.
+const BALANCED: f64 = 1e-4;
+
 /// Reads what the program that a folder was written for has left there, and writes `history.csv` and `summary.json`
 /// next to it or into another folder, which is returned.
 ///
 /// # Errors
-/// [`text::Error::Unreadable`] without `model.json` or results; [`text::Error::Unwritable`].
+/// [`text::Error::Unreadable`] without `model.json` or results; [`text::Error::Unwritable`]; an increment that is no
+/// equilibrium, when the rows before it are written.
 pub fn import(folder: &Path, out: Option<&Path>) -> Result<PathBuf, Error> {
     let path = folder.join(MODEL);
     let model: Model = serde_json::from_str(&read(&path)?)
@@ -38,9 +43,12 @@ pub fn import(folder: &Path, out: Option<&Path>) -> Result<PathBuf, Error> {
         Program::Kratos => of_kratos(folder, &model),
         Program::Calculix => of_calculix(folder, &model),
     }?;
-    let rows: Vec<Vec<f64>> = (0..found.len())
-        .map(|step| row(&model, &found, step))
-        .collect();
+    let open = (0..found.len()).find_map(|step| {
+        let share = out_of_balance(&model, &found[step], step);
+        (share.is_nan() || share > BALANCED).then_some((step, share))
+    });
+    let n_rows = open.map_or(found.len(), |(step, _)| step);
+    let rows: Vec<Vec<f64>> = (0..n_rows).map(|step| row(&model, &found, step)).collect();
     let out = out.unwrap_or(folder);
     std::fs::create_dir_all(out).map_err(|error| text::Error::unwritable(out, error))?;
     let table = table(&model, &rows).map_err(|error| Error::internal(error.to_string()))?;
@@ -50,7 +58,7 @@ pub fn import(folder: &Path, out: Option<&Path>) -> Result<PathBuf, Error> {
     let probes: Map<String, Value> = probes.map(|(p, v)| (p.name.clone(), json!(v))).collect();
     let summary = json!({
         "program": model.program.name(),
-        "status": "done",
+        "status": if open.is_none() { "done" } else { "stopped" },
         "case": model.case,
         "variant": model.variant,
         "title": model.title,
@@ -58,7 +66,54 @@ pub fn import(folder: &Path, out: Option<&Path>) -> Result<PathBuf, Error> {
         "probes": probes,
     });
     replace(&out.join("summary.json"), format!("{summary:#}\n"))?;
-    Ok(out.to_owned())
+    match open {
+        None => Ok(out.to_owned()),
+        Some((step, share)) => Err(Error::usage(format!(
+            "phase `{}`, increment {}: the results of {} are no equilibrium there: {share:.1e} of the largest nodal force is \
+             out of balance; the {n_rows} increments before it are in {}",
+            model.steps[step].phase,
+            model.steps[step].increment,
+            model.program.name(),
+            out.join("history.csv").display()
+        ))),
+    }
+}
+
+/// Largest force out of balance on nodes that are free to move, relative to the largest nodal force.
+fn out_of_balance(model: &Model, found: &Found, step: usize) -> f64 {
+    let mut external = vec![[0.0; 2]; model.nodes.len()];
+    for load in &model.loads {
+        for (node, force) in load.nodes.iter().zip(&load.forces) {
+            for (sum, force) in external[*node].iter_mut().zip(force) {
+                *sum += load.factors[step + 1] * force;
+            }
+        }
+    }
+    let mut is_held = vec![[false; 2]; model.nodes.len()];
+    for held in &model.held {
+        for &node in &held.nodes {
+            is_held[node][held.component] = true;
+        }
+    }
+    // Radial forces of CalculiX contain those on the sides of its sector.
+    let of_sector = model.program == Program::Calculix && model.axisymmetric;
+    let (mut open, mut largest) = (0.0_f64, 0.0_f64);
+    for node in 0..model.nodes.len() {
+        for c in usize::from(of_sector)..2 {
+            let left = match &found.reaction {
+                Reaction::Less(forces) => forces[node][c],
+                Reaction::Internal(forces) => forces[node][c] - external[node][c],
+            };
+            if !left.is_finite() {
+                return f64::NAN;
+            }
+            largest = largest.max(left.abs()).max(external[node][c].abs());
+            if !is_held[node][c] {
+                open = open.max(left.abs());
+            }
+        }
+    }
+    if largest > 0.0 { open / largest } else { 0.0 }
 }
 
 fn read(path: &Path) -> Result<String, Error> {

@@ -22,6 +22,15 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use text::write::replace;
 
+/// Other files of an export and its results: whole names, and beginnings.
+const NAMES: [&str; 5] = [
+    "history.csv",
+    "summary.json",
+    "report.html",
+    "nodes.csv",
+    "bulk.vtu",
+];
+const STARTS: [&str; 5] = ["model.", "result_", "held_", "load_", "run_kratos"];
 /// Name of the model's file in the folder.
 const MODEL: &str = "model.json";
 
@@ -72,6 +81,7 @@ pub fn export(case: &Case, to: Program, folder: &Path) -> Result<Vec<NotCarried>
     let model = Model::of(case, to)?;
     let unwritable = |error| text::Error::unwritable(folder, error);
     std::fs::create_dir_all(folder).map_err(unwritable)?;
+    forget(folder).map_err(unwritable)?;
     let text = serde_json::to_string(&model).map_err(|error| Error::internal(error.to_string()))?;
     replace(&folder.join(MODEL), text)?;
     let files = match to {
@@ -83,4 +93,21 @@ pub fn export(case: &Case, to: Program, folder: &Path) -> Result<Vec<NotCarried>
         replace(&folder.join(name), text)?;
     }
     Ok(model.not_carried)
+}
+
+/// Removes input and results of an earlier export, which would be read as those of this one.
+fn forget(folder: &Path) -> std::io::Result<()> {
+    if !folder.join(MODEL).is_file() {
+        return Ok(());
+    }
+    for entry in std::fs::read_dir(folder)? {
+        let entry = entry?;
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        let is_ours = NAMES.contains(&&*name) || STARTS.iter().any(|start| name.starts_with(start));
+        if is_ours && entry.file_type()?.is_file() {
+            std::fs::remove_file(entry.path())?;
+        }
+    }
+    Ok(())
 }

@@ -47,7 +47,7 @@ pub(crate) fn radial_forces(case: &Case, held: &[Held], loads: &[Load]) -> Optio
     (largest(0, true) > ROUND_OFF * all).then(|| NotCarried {
         place: case.source.place(&case.file.phases.first().map_or(0..0, |p| p.name.span())),
         key: "phase".to_owned(),
-        reason: "radial forces act along the middle of its sector of 2°: displacements are 1e-4 too small".to_owned(),
+        reason: "radial forces act along the middle of its sector of 2°: radial displacements are up to 1e-4 (relative) too small".to_owned(),
     })
 }
 
@@ -306,11 +306,7 @@ impl Check<'_> {
             let reduced = points(group);
             let is_full = group.integration == Some(Integration::Full);
             if self.to == Program::Kratos && !reduced {
-                leave(
-                    span,
-                    key,
-                    "its elements have 2 × 2 points, as `reduced` here",
-                );
+                leave(span, key, "taken as `reduced`: 2 × 2 points");
             } else if !reduced && !is_full {
                 leave(
                     span,
@@ -318,7 +314,7 @@ impl Check<'_> {
                     "taken as `full`: 3 × 3 points, strains as they are",
                 );
             } else if self.to == Program::Ogs && reduced != points(&problem.groups[0]) {
-                leave(span, key, "all groups have as many points as the first");
+                leave(span, key, "taken as that of the first group of the file");
             }
         }
         if let Some(pile) = &file.pile {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
@@ -278,10 +279,9 @@ class Mesh:
 
 def _meshio() -> Any:
     try:
-        import meshio
+        return importlib.import_module("meshio")
     except ImportError:
         raise InputError("meshio is not installed", hint="pip install meshio; MED and XDMF need h5py, too") from None
-    return meshio
 
 
 def _families(mesh: Any, number: int) -> Iterator[tuple[str, NDArray[np.int64]]]:

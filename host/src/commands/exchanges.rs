@@ -19,7 +19,10 @@ pub(super) fn export(asked: &Export, opener: &Opener) -> Result<(), Error> {
     let program = asked.to;
     let folder = asked.out.clone().unwrap_or_else(|| {
         let name = format!("{}_{}", case.name(), program.name().to_lowercase());
-        Path::new("results").join(name)
+        let folder = Path::new("results").join(name);
+        case.variant
+            .as_ref()
+            .map_or_else(|| folder.clone(), |variant| folder.join(variant))
     });
     let not_carried = exchange::export(&case, program, &folder)
         .map_err(|error| variants::of_variant(error, case.variant.as_deref()))?;
