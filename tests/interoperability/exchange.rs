@@ -4,6 +4,7 @@ use crate::{KRATOS, OPENGEOSYS, beside, installed, is_there};
 use exchange::{Model, Program};
 use input::Case;
 use std::collections::HashMap;
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use tests::needs;
@@ -277,12 +278,12 @@ fn what_is_no_equilibrium_is_not_taken_for_one() {
     for step in 0..model.steps.len() {
         for node in 0..model.nodes.len() {
             let force = if node == free && step == 2 { 1e6 } else { 0.0 };
-            rows += &format!("{step},{node},0,0,0,{force}\n");
+            let _ = writeln!(rows, "{step},{node},0,0,0,{force}");
         }
     }
     std::fs::write(there.join("nodes.csv"), rows).unwrap();
     let error = exchange::import(there, None).unwrap_err().to_string();
-    assert!(error.contains("are no equilibrium there"), "{error}");
+    assert!(error.contains("no equilibrium: 1.0e0 of"), "{error}");
     assert_eq!(tests::case::table(&there.join("history.csv")).len(), 2);
     let summary = std::fs::read_to_string(there.join("summary.json")).unwrap();
     assert!(summary.contains("\"status\": \"stopped\""), "{summary}");
@@ -293,6 +294,8 @@ fn what_is_no_equilibrium_is_not_taken_for_one() {
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .collect();
+    let error = exchange::import(there, None).unwrap_err().to_string();
+    assert!(error.contains("run `ccx model` there first"), "{error}");
     left.sort();
     assert_eq!(left, ["mine.txt", "model.inp", "model.json"]);
 }

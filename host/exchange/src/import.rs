@@ -32,8 +32,8 @@ const BALANCED: f64 = 1e-4;
 /// next to it or into another folder, which is returned.
 ///
 /// # Errors
-/// [`text::Error::Unreadable`] without `model.json` or results; [`text::Error::Unwritable`]; an increment that is no
-/// equilibrium, when the rows before it are written.
+/// [`text::Error::Unreadable`] without `model.json`; [`text::Error::Unwritable`]; no results; an increment that is missing
+/// or no equilibrium, when the rows before it are written.
 pub fn import(folder: &Path, out: Option<&Path>) -> Result<PathBuf, Error> {
     let path = folder.join(MODEL);
     let model: Model = serde_json::from_str(&read(&path)?)
@@ -43,6 +43,13 @@ pub fn import(folder: &Path, out: Option<&Path>) -> Result<PathBuf, Error> {
         Program::Kratos => of_kratos(folder, &model),
         Program::Calculix => of_calculix(folder, &model),
     }?;
+    if found.is_empty() {
+        return Err(Error::usage(format!(
+            "no results in {}: run `{}` there first",
+            folder.display(),
+            model.program.command()
+        )));
+    }
     let open = (0..found.len()).find_map(|step| {
         let share = out_of_balance(&model, &found[step], step);
         (share.is_nan() || share > BALANCED).then_some((step, share))
@@ -58,7 +65,7 @@ pub fn import(folder: &Path, out: Option<&Path>) -> Result<PathBuf, Error> {
     let probes: Map<String, Value> = probes.map(|(p, v)| (p.name.clone(), json!(v))).collect();
     let summary = json!({
         "program": model.program.name(),
-        "status": if open.is_none() { "done" } else { "stopped" },
+        "status": if open.is_none() && n_rows == model.steps.len() { "done" } else { "stopped" },
         "case": model.case,
         "variant": model.variant,
         "title": model.title,
@@ -66,17 +73,22 @@ pub fn import(folder: &Path, out: Option<&Path>) -> Result<PathBuf, Error> {
         "probes": probes,
     });
     replace(&out.join("summary.json"), format!("{summary:#}\n"))?;
-    match open {
-        None => Ok(out.to_owned()),
-        Some((step, share)) => Err(Error::usage(format!(
-            "phase `{}`, increment {}: the results of {} are no equilibrium there: {share:.1e} of the largest nodal force is \
-             out of balance; the {n_rows} increments before it are in {}",
-            model.steps[step].phase,
-            model.steps[step].increment,
-            model.program.name(),
-            out.join("history.csv").display()
-        ))),
-    }
+    let Some(step) = model.steps.get(n_rows) else {
+        return Ok(out.to_owned());
+    };
+    let why = open.map_or_else(
+        || "there are no results".to_owned(),
+        |(_, share)| {
+            format!("no equilibrium: {share:.1e} of the largest nodal force is out of balance")
+        },
+    );
+    Err(Error::usage(format!(
+        "phase `{}`, increment {}: {why}; the {n_rows} of {} increments before it are in {}",
+        step.phase,
+        step.increment,
+        model.steps.len(),
+        out.join("history.csv").display()
+    )))
 }
 
 /// Largest force out of balance on nodes that are free to move, relative to the largest nodal force.
@@ -136,8 +148,10 @@ fn unreadable(path: &Path, why: impl Into<String>) -> Error {
 }
 
 fn of_opengeosys(folder: &Path, model: &Model) -> Result<Vec<Found>, Error> {
+    let path_of =
+        |number: usize| folder.join(format!("{}_{}.vtu", opengeosys::RESULTS, number + 1));
     let step = |number: usize| {
-        let path = folder.join(format!("{}_{}.vtu", opengeosys::RESULTS, number + 1));
+        let path = path_of(number);
         let text = read(&path)?;
         let pairs = |name: &str| {
             let values = vtu::array(&text, name).filter(|all| all.len() == 2 * model.nodes.len());
@@ -155,15 +169,20 @@ fn of_opengeosys(folder: &Path, model: &Model) -> Result<Vec<Found>, Error> {
             reaction: Reaction::Internal(pairs("NodalForces")?),
         })
     };
-    (0..model.steps.len()).map(step).collect()
+    let is_there = |number: &usize| path_of(*number).is_file();
+    let steps = (0..model.steps.len()).take_while(is_there);
+    steps.map(step).collect()
 }
 
 fn of_kratos(folder: &Path, model: &Model) -> Result<Vec<Found>, Error> {
     let path = folder.join(kratos::RESULTS);
     let n = model.nodes.len();
     let mut all = vec![[vec![[0.0; 2]; n], vec![[0.0; 2]; n]]; model.steps.len()];
+    if !path.is_file() {
+        return Ok(Vec::new());
+    }
     let text = read(&path)?;
-    let mut count = 0;
+    let mut counts = vec![0; model.steps.len()];
     for line in text.lines().skip(1) {
         let numbers: Option<Vec<f64>> = line.split(',').map(|word| word.parse().ok()).collect();
         let Some(&[step, node, u, v, r, s]) = numbers.as_deref() else {
@@ -173,14 +192,10 @@ fn of_kratos(folder: &Path, model: &Model) -> Result<Vec<Found>, Error> {
         let [displacement, reaction] = place.ok_or_else(|| unreadable(&path, "another model's"))?;
         displacement[node as usize] = [u, v];
         reaction[node as usize] = [r, s];
-        count += 1;
+        counts[step as usize] += 1;
     }
-    if count != n * model.steps.len() {
-        return Err(unreadable(
-            &path,
-            "not every node of every increment is there",
-        ));
-    }
+    let whole = counts.iter().take_while(|count| **count == n).count();
+    all.truncate(whole);
     let found = |[displacement, reaction]: [Vec<[f64; 2]>; 2]| Found {
         displacement,
         reaction: Reaction::Less(reaction),
@@ -190,9 +205,13 @@ fn of_kratos(folder: &Path, model: &Model) -> Result<Vec<Found>, Error> {
 
 fn of_calculix(folder: &Path, model: &Model) -> Result<Vec<Found>, Error> {
     let path = folder.join("model.dat");
+    if !path.is_file() {
+        return Ok(Vec::new());
+    }
     let [displacements, forces] = calculix::printed(&read(&path)?, model.nodes.len());
-    if displacements.len() != model.steps.len() || forces.len() != model.steps.len() {
-        return Err(unreadable(&path, "not every increment is there"));
+    let n = displacements.len();
+    if n > model.steps.len() || forces.len() > n {
+        return Err(unreadable(&path, "more increments than the case has"));
     }
     let factor = if model.axisymmetric {
         calculix::SECTORS

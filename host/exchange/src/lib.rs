@@ -23,7 +23,8 @@ use std::path::Path;
 use text::write::replace;
 
 /// Other files of an export and its results: whole names, and beginnings.
-const NAMES: [&str; 5] = [
+const NAMES: [&str; 6] = [
+    "result.pvd",
     "history.csv",
     "summary.json",
     "report.html",
