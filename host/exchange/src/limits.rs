@@ -47,7 +47,7 @@ pub(crate) fn radial_forces(case: &Case, held: &[Held], loads: &[Load]) -> Optio
     (largest(0, true) > ROUND_OFF * all).then(|| NotCarried {
         place: case.source.place(&case.file.phases.first().map_or(0..0, |p| p.name.span())),
         key: "phase".to_owned(),
-        reason: "radial forces act along the middle of its sector of 2°: radial displacements are up to 1e-4 (relative) too small".to_owned(),
+        reason: "radial forces act along the middle of its sector of 2°: radial displacements are up to 2e-4 (relative) too small".to_owned(),
     })
 }
 

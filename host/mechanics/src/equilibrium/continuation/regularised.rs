@@ -12,8 +12,9 @@
 //! A regularised correction is smaller than the error, so its size alone accepts nothing. If the last corrections
 //! shrink by a factor ρ < 1 each, those to come add up to ρ/(1 − ρ) times the last one, and that is held against the
 //! tolerance. A whole Newton correction of that state must not be larger than the increment: it sees a mode that
-//! regularised corrections follow slowly. A body that moves on at constant speed (ρ = 1: a mechanism, until other points yield or unload) is in no
-//! equilibrium, however small its residual. It is followed by long moves along the same correction.
+//! regularised corrections follow slowly. A body that moves on at constant speed (ρ = 1: a mechanism, until other points
+//! yield or unload) is in no equilibrium, however small its residual. It is followed by long moves along the same
+//! correction.
 
 use crate::equilibrium::newton::{
     Acceleration, Control, Correction, Iteration, Newton, State, StepFailure, Task, dot, norm,
