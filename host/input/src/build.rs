@@ -352,7 +352,7 @@ impl Case {
     }
 }
 
-/// What a group is as ground before the first phase.
+/// Reads the state of a group as ground before the first phase.
 fn ground(source: &Source, input: &GroupInput) -> Result<Ground, Error> {
     let stress = input.initial_stress.as_ref();
     let read = |stress: &Spanned<StressInput>| stress.get_ref().read(source, stress.span());

@@ -10,7 +10,7 @@ use self::parser::Parser;
 /// Longest text of an expression, in bytes: it bounds how deep expressions nest.
 const LONGEST: usize = 500;
 
-/// What an expression takes from a law.
+/// A value of a law that an expression refers to.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Reference {
     /// `LAW.PARAMETER`.
@@ -76,7 +76,7 @@ impl Expression {
     /// Reads such a text.
     ///
     /// # Errors
-    /// What does not fit, in words.
+    /// A sentence about the first part that is not an expression.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
         if text.len() > LONGEST {
             return Err(format!("the expression is longer than {LONGEST} bytes"));

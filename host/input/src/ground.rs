@@ -198,7 +198,7 @@ impl StressInput {
         }))
     }
 
-    /// Of the horizontal to the vertical effective stress.
+    /// Ratio of the horizontal to the vertical effective stress.
     fn ratio(&self, source: &Source, at: Range<usize>) -> Result<Ratio, Error> {
         let profile = |input: &Spanned<ProfileInput>| input.get_ref().read(source, input.span());
         let optional =

@@ -62,7 +62,7 @@ fn name_of(path: &Path, kind: &str) -> String {
 /// # Errors
 /// It cannot be read.
 pub fn is_driver(path: &Path) -> Result<bool, Error> {
-    /// What only a driver has.
+    /// Keys that only driver files have.
     #[derive(serde::Deserialize)]
     struct OfDriver {
         hypothesis: Option<IgnoredAny>,

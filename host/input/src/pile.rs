@@ -8,7 +8,7 @@ use results::pile::{Base, Misfit, Parts, Pile};
 use text::{Source, suggestion};
 use toml::Spanned;
 
-/// Where the pile ends below: a group that is not its shaft, or a line.
+/// The base of the pile: a group other than its shaft, or a line.
 fn base(
     source: &Source,
     written: &Spanned<String>,

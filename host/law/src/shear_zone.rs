@@ -183,7 +183,7 @@ impl ShearZone {
 #[derive(Debug)]
 struct FilledZone {
     zone: ShearZone,
-    /// What the law is called under.
+    /// The hypothesis under which the law is called.
     solid: Hypothesis,
     formulation: FormulationDescription,
     source: Arc<dyn Source>,

@@ -4,7 +4,7 @@
 pub(crate) struct Joined(Vec<usize>);
 
 impl Joined {
-    /// Each of `n` numbers is a set of its own.
+    /// `n` sets of one number each.
     pub(crate) fn new(n: usize) -> Self {
         Self((0..n).collect())
     }

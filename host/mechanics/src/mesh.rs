@@ -20,7 +20,7 @@ pub struct Solid {
 }
 
 impl Solid {
-    /// An element of a kind. Of `nodes`, the first ones are taken, in the order of the kind.
+    /// An element of a kind. It takes the first nodes of `nodes`, in the order of the kind.
     pub fn new(kind: &'static Kind, nodes: &[usize], group: usize) -> Self {
         let mut own = [0; Kind::MOST_NODES];
         own[..kind.n_nodes()].copy_from_slice(&nodes[..kind.n_nodes()]);

@@ -103,7 +103,7 @@ pub struct Material {
 pub enum Variation {
     /// Over the height y (z): each element takes the value at its centre.
     Height(Profile),
-    /// Of every element of a group, in their order.
+    /// One value for each element of a group, in their order.
     Elements(Vec<f64>),
 }
 

@@ -75,7 +75,7 @@ const KEYS: [&str; 12] = [
     "initial",
 ];
 
-/// What a file would say of a law; what is no key of it is a parameter.
+/// The table that a case file would have for a law. Arguments that are no keys of that table are parameters.
 fn table_of(
     py: Python<'_>,
     id: &str,

@@ -1,4 +1,4 @@
-//! What a mesh has, as text: elements, groups, lines, shapes.
+//! Elements, groups, lines and shapes of a mesh as text.
 
 use mechanics::mesh::{Line, Mesh, Solid};
 use mechanics::problem::{Analysis, Axis};
@@ -12,7 +12,7 @@ const MOST_ENDS: usize = 4;
 /// A mesh, and what its names mean.
 #[derive(Clone, Debug)]
 pub struct MeshTable {
-    /// Where it comes from.
+    /// Title: the file's name.
     pub title: String,
     /// The mesh.
     pub mesh: Mesh,
@@ -20,7 +20,7 @@ pub struct MeshTable {
     pub groups: Vec<String>,
     /// For each solid element the number in its file; empty if there are none.
     pub numbers: Vec<u64>,
-    /// What the axes are.
+    /// Meaning of the axes.
     pub analysis: Analysis,
     /// What the user should know.
     pub notes: Vec<String>,

@@ -120,7 +120,7 @@ pub struct Loads {
 }
 
 impl Loads {
-    /// Of head, shaft and base.
+    /// Loads of head, shaft and base, kN.
     pub(crate) fn of_parts(&self) -> [f64; 3] {
         [self.head, self.shaft, self.base]
     }
@@ -183,7 +183,7 @@ pub struct State {
     pub loads: Loads,
     /// Change of head, shaft and base load since the last reset, kN.
     pub net: Option<[f64; 3]>,
-    /// What ground that drags it down does to it.
+    /// Effect of ground that drags it down.
     pub downdrag: Downdrag,
     /// From the head to the base.
     pub stations: Vec<Station>,
@@ -389,8 +389,8 @@ impl Pile {
         })
     }
 
-    /// What the upper half of an element holds more than the lower, halved, in its middle: friction is a parabola
-    /// there.
+    /// Half the difference between the friction forces of an element's upper and lower halves, kN; 0 if the row is not
+    /// in its middle. Friction is a parabola within an element.
     fn bend(&self, row: &Row, along: &[Option<[friction::Skin; 3]>]) -> f64 {
         let middle = row.at.iter().find(|(_, part)| *part == 1);
         let of = |&(span, _): &(usize, usize)| {

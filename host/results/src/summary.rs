@@ -53,7 +53,7 @@ pub struct Summary {
     pub(crate) seconds: Seconds,
 }
 
-/// What is known before the first increment.
+/// The part of a summary that is known before the first increment.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub(crate) struct Head {
@@ -381,7 +381,7 @@ pub(crate) struct Resistances {
     pub(crate) weight: Option<f64>,
 }
 
-/// What is told of a criterion.
+/// Loads at the settlement of a criterion, or the reason why there is no value.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Criterion {
     pub(crate) load: Option<f64>,

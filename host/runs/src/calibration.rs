@@ -288,7 +288,7 @@ fn wish(calibration: &Calibration, model: &Model) -> Wish {
     }
 }
 
-/// What the stages have found.
+/// Results of all stages.
 struct Found {
     /// All parameters as the search counts them.
     counted: Vec<f64>,

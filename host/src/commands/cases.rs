@@ -86,7 +86,7 @@ fn run_cases(asked: &Run, opener: &Opener, stop: &Stop) -> Result<(), Error> {
 #[derive(Default)]
 struct Ended {
     failure: Option<Error>,
-    /// Of a report.
+    /// Error of a report that could not be written.
     unwritten: Option<Error>,
     /// Figures of the variants.
     drawn: Vec<(String, Figures)>,

@@ -44,7 +44,7 @@ pub(crate) enum Kind {
         found: String,
         expected: String,
     },
-    /// What a type says of its own values.
+    /// The message of a type about its values.
     Other(String),
 }
 

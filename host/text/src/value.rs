@@ -18,7 +18,7 @@ pub(crate) struct Value<'i> {
     span: Range<usize>,
 }
 
-/// Reads the whole of a file. What misses in it has no place.
+/// Reads a whole file. A missing key of its root table has no place.
 pub(crate) fn read_root<'i, T: Deserialize<'i>>(table: Spanned<DeTable<'i>>) -> Result<T, Misfit> {
     T::deserialize(MapAccessDeserializer::new(Pairs::new(table.into_inner())))
 }

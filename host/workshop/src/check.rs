@@ -116,7 +116,7 @@ static DRIVER: Check = Check {
 /// Checks of what is asked for, none of the library.
 static INNER: [&Check; 2] = [&SETTINGS, &DRIVER];
 
-/// What cannot be read needs no checks, and what it was is what is reported.
+/// SHA-256 of a library. A file that cannot be read is an error, and nothing is checked.
 fn sha256_of(path: &Path) -> Result<String, Error> {
     let bytes = file::read_library(path).map_err(|source| text::Error::Unreadable {
         path: path.to_owned(),

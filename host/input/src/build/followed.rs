@@ -71,7 +71,7 @@ impl LawShelf<'_> {
     /// depend on it, and then those of all elements.
     ///
     /// # Errors
-    /// What does not fit.
+    /// An expression refers to a law or parameter that does not exist, or gives no finite number.
     pub(super) fn valued_in(
         &self,
         group: usize,

@@ -1,4 +1,4 @@
-//! Which place of a case file an error of its problem is about.
+//! Places in a case file of the items that errors of its problem name.
 
 use crate::case::{Case, GroupInput, PhaseInput};
 use crate::spanned::Given;

@@ -1,4 +1,4 @@
-//! What is said of many things at once.
+//! Messages that list several faults or names.
 
 use super::cursor::Fault;
 
@@ -24,7 +24,7 @@ pub(super) fn list(names: impl ExactSizeIterator<Item = String>) -> String {
     }
 }
 
-/// Faults of a file: several are said at once.
+/// Faults of a file. Several are reported together.
 #[derive(Default)]
 pub(super) struct Faults(Vec<Fault>);
 

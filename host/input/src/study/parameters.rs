@@ -1,4 +1,4 @@
-//! What is checked of a study's parameters before any case is read.
+//! Checks of a study's parameters before any case is read.
 
 use super::{COLUMNS, Keys, MOST_RUNS, Method, Parameter, ParameterInput, Spread, StudyFile};
 use crate::Error;
@@ -173,7 +173,7 @@ fn check_values(
     Ok(())
 }
 
-/// Where and why `levels` do not go with the method and the spread, which is called and written so.
+/// Place and reason if `levels` do not fit the method or the spread, given by its name and place.
 fn wrong_levels(
     input: &ParameterInput,
     method: Method,
@@ -221,7 +221,7 @@ fn keys_and_name(source: &Source, input: &ParameterInput) -> Result<(Vec<String>
     Ok((keys, name))
 }
 
-/// What a parameter, which stands at `span`, is spread over: one thing.
+/// The spread of a parameter whose table is at `span`; exactly one kind of spread is allowed.
 fn spread(
     source: &Source,
     input: &ParameterInput,

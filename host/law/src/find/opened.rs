@@ -31,7 +31,7 @@ pub struct Library {
 pub(crate) struct OpenedLaw {
     pub(crate) description: LawDescription,
     pub(crate) source: Arc<dyn Source>,
-    /// Where it is in the library's memory, if it keeps the contract and is called in this process.
+    /// Its handle in the library, if the library follows the contract and is called in this process.
     pub(crate) handle: Option<LawHandle>,
     /// The zone that it fills, if it is the law of one.
     pub(crate) zone: Option<ShearZone>,

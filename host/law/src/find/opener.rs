@@ -162,8 +162,8 @@ impl Opener {
         }))
     }
 
-    /// The laws of a foreign library, in this process or in workers, and the hash of its sidecar. What the sidecar says
-    /// becomes part of how the library is named.
+    /// The laws of a foreign library, in this process or in workers, and the hash of its sidecar. The hash becomes part
+    /// of the library's identity.
     fn foreign_laws(
         &self,
         foreign: &mut Foreign,

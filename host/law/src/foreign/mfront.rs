@@ -260,7 +260,7 @@ impl Reader<'_> {
         Ok((formulation, slots, parameters))
     }
 
-    /// What is given from outside, each with its place, in the order of the interface.
+    /// Inputs of the behaviour with their slots, in the order of the interface.
     fn inputs(&self, modelling: &str) -> Result<Vec<(Slot, ParameterDescription)>, String> {
         let mut inputs = Vec::new();
         let parameter = |name: &str, default| self.parameter(modelling, name, default);

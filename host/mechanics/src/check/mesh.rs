@@ -88,7 +88,7 @@ pub(super) struct Face {
     pub(super) middle: usize,
 }
 
-/// What is wrong with the shape of a zero-thickness element.
+/// A fault in the shape of a zero-thickness element.
 fn joint_fault(problem: &Problem, joint: &Joint) -> Option<JointFault> {
     let place = |node: usize| problem.mesh.nodes[node];
     let apart = |a: usize, b: usize| {

@@ -221,7 +221,7 @@ fn course(problem: &Problem, number: usize, phase: &Phase) -> Result<(), Refusal
     Ok(())
 }
 
-/// What ends a phase before its time leaves no change half done that is there or not.
+/// Refuses `until` in a phase with changes that must be complete at its end, such as activated groups.
 fn until(number: usize, phase: &Phase) -> Result<(), Refusal> {
     let Some(until) = &phase.until else {
         return Ok(());

@@ -349,8 +349,8 @@ fn beside_undrained(problem: &Problem) -> Vec<String> {
     found.iter().map(say).collect()
 }
 
-/// Of every edge inside a thin layer, by its middle: for how many of its elements it is a face of the layer, and how
-/// many elements there are.
+/// For every edge of a thin layer, by its middle node: the number of elements for which it is a face of the layer, and
+/// the number of all its elements.
 fn edges_in_layer(mesh: &Mesh, group: &Group) -> HashMap<usize, (usize, usize)> {
     let mut edges = HashMap::<usize, (usize, usize)>::new();
     for element in 0..group.kinematics.n_elements() {

@@ -59,7 +59,8 @@ pub(super) fn warnings(problem: &Problem) -> Vec<String> {
 }
 
 impl Load<'_> {
-    /// Where it stands among elements, of which so many are there at the middle of an edge.
+    /// Whether its line bounds active elements, lies inside them, or has none. `sides` gives the number of active elements
+    /// that have a node in the middle of a side.
     fn stands_in(&self, mesh: &Mesh, sides: impl Fn(usize) -> usize) -> Stands {
         let edges = mesh.lines.get(self.line).into_iter();
         let edges = edges.flat_map(|line| &line.edges);

@@ -43,7 +43,7 @@ pub(crate) struct Points {
 }
 
 impl Points {
-    /// The strains at so many points.
+    /// Strains at `xi` times `eta` points.
     pub(crate) const fn at(xi: usize, eta: usize) -> Self {
         Self {
             along: [xi, eta],
@@ -62,7 +62,7 @@ pub(crate) struct Division {
     pub(crate) parts: Vec<Vec<Place>>,
 }
 
-/// Where the node of a part is.
+/// Position of a node of a part in the whole element.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Place {
     /// At a node of the whole.
@@ -76,7 +76,7 @@ pub(crate) enum Place {
 /// Elements of one kind that are to be built.
 pub(crate) struct Elements<'a> {
     pub(crate) analysis: Analysis,
-    /// Of all nodes, m.
+    /// Coordinates of all nodes, m.
     pub(crate) coordinates: &'a [[f64; 2]],
     /// Nodes of each element.
     pub(crate) nodes: &'a [&'a [usize]],

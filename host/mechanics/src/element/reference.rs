@@ -15,7 +15,7 @@ pub(super) struct Reference<const N: usize> {
     pub(super) exact: fn() -> Vec<RulePoint>,
     /// The same where sides are curved: degree 7 in ξ and in η of quads, 6 of triangles.
     pub(super) exact_curved: fn() -> Vec<RulePoint>,
-    /// The rule with so many points along ξ and η ([`Points::along`](super::kind::Points)).
+    /// The rule with these numbers of points along ξ and η ([`Points::along`](super::kind::Points)).
     pub(super) rule: fn([usize; 2]) -> Vec<RulePoint>,
     /// Corners and middle of every side.
     pub(super) sides: &'static [[usize; 3]],

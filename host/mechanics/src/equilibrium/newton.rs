@@ -77,7 +77,7 @@ pub struct Newton<'a> {
     pub(super) settings: &'a Settings,
     /// Costs so far.
     costs: &'a mut Costs,
-    /// What iterates of the step are measured against.
+    /// Reference sizes that residuals and corrections of the step are divided by.
     reference: Reference,
     /// Data that decide whether the matrix is kept.
     pub(super) kept: Kept,
@@ -89,7 +89,7 @@ pub struct Newton<'a> {
     stop: (Stop, Instant),
 }
 
-/// Where iterates of a step are counted from.
+/// The state from which displacement increments of a step are measured.
 #[derive(Debug, Default)]
 pub(super) struct Start {
     /// Forces of the domain at the end of the step if its boundary stays where it is.

@@ -1,5 +1,4 @@
-//! What is found out about a group's points and their law: how they give way, whether tangents are right, and bonds and
-//! faces that a user should know of.
+//! Diagnosis of a group: failure modes of its points, wrong tangents of its law, broken bonds and open faces.
 
 mod breaks;
 mod broken_bonds;

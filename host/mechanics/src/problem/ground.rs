@@ -127,7 +127,7 @@ impl Ratio {
     }
 }
 
-/// What a group is as ground before the first phase.
+/// State of a group as ground before the first phase.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ground {
     /// Effective stress.

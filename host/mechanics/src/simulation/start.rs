@@ -79,8 +79,8 @@ impl Simulation {
         Ok(prescribed)
     }
 
-    /// Undrained from now on, or drained again: groups of which a phase says so, and those whose law starts. The
-    /// stiffness of the pore water follows from that of the law.
+    /// Sets the drainage of groups that a phase names, and of those whose law starts. The stiffness of the pore water
+    /// follows from that of the law.
     fn set_drainages(
         &mut self,
         number: usize,

@@ -83,11 +83,11 @@ type Found = Result<Criterion, String>;
 pub struct Criterion {
     /// The last phase that reaches it.
     pub phase: String,
-    /// Of the head.
+    /// Load of the head, kN.
     pub head: f64,
-    /// Of it the shaft's.
+    /// Share of the shaft, kN.
     pub shaft: f64,
-    /// Of it the base's.
+    /// Share of the base, kN.
     pub base: f64,
 }
 

@@ -77,7 +77,7 @@ pub(crate) fn write(folder: &Path, curve: &Curve) -> Result<(), Error> {
     replace(&folder.join(FILE_NAME), text)
 }
 
-/// The cycles of a pile that is in place. Those of phases that count settlements anew stand for themselves.
+/// The cycles of a pile that is in place. Cycles in phases that reset settlements are separate.
 fn cycles(curve: &Curve) -> Vec<Cycle<'_>> {
     let phases = curve.phases().filter(|phase| phase.is_in_place);
     let points = || phases.clone().flat_map(|phase| &phase.points);

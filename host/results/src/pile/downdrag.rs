@@ -8,7 +8,7 @@ const NONE: f64 = 1e-6;
 /// The ground drags the pile down over this share of the shaft's length at least, or not at all.
 const LEAST: f64 = 0.1;
 
-/// What the ground that settles more than the pile does to it.
+/// Effect on a pile of ground that settles more than the pile.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Downdrag {
     /// Height at which friction changes from downward above to upward below, m.

@@ -201,7 +201,8 @@ fn smooth(spans: &[Average]) -> Vec<[Skin; 3]> {
     (0..n).map(|number| values(&ends, number)).collect()
 }
 
-/// The upper end of a span; of all, the lower end of the last. Where nothing goes on, tractions stay as they are.
+/// Tractions at the upper end of a span; with `number` the number of spans, at the lower end of the last. They are not
+/// smoothed where no span follows.
 fn end(spans: &[Average], number: usize) -> End {
     let n = spans.len();
     let of = |f: &dyn Fn(usize) -> f64| -> Skin { std::array::from_fn(f) };

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Forces of a pile in one state.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Forces {
-    /// Of head, shaft and base.
+    /// Loads of head, shaft and base, kN.
     loads: [f64; 3],
     /// Axial force and shaft friction by row.
     rows: Vec<[f64; 2]>,
@@ -25,7 +25,7 @@ impl Forces {
     }
 }
 
-/// Where net forces are counted from.
+/// The state that net forces are measured from.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Net {
     phase: Option<String>,

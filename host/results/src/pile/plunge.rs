@@ -1,4 +1,4 @@
-//! What is said of a pile that finds no further equilibrium.
+//! The message about a pile that finds no further equilibrium.
 
 use super::{Base, Pile};
 use mechanics::equilibrium::Mechanism;
@@ -120,7 +120,7 @@ impl Pile {
     }
 }
 
-/// What the shaft does, by the modes of its points that give way and by the worst failure if that is its.
+/// Whether the shaft slides or yields, from the failure modes of its points and from the worst mechanism if it lies there.
 fn of_shaft(
     modes: &[FailureMode],
     n_points: usize,

@@ -15,7 +15,7 @@ pub(crate) struct Record {
     stations: Stations,
     net: Net,
     curve: Curve,
-    /// Of the joints of its shaft, in the present phase.
+    /// Compliance of the joints of its shaft in the present phase.
     compliance: Vec<Option<f64>>,
     /// Phases that settlements are counted from.
     resets: Vec<String>,

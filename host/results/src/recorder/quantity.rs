@@ -1,4 +1,4 @@
-//! What a phase may end at: a column of `history.csv`, measured while the phase goes on.
+//! The quantity that ends a phase: a column of `history.csv`, evaluated after every step.
 
 use super::Recorder;
 use crate::pile::COLUMNS;

@@ -79,7 +79,7 @@ struct Drawn<'a> {
     units: BTreeMap<&'a str, &'a str>,
 }
 
-/// What the page is for.
+/// The medium of a page.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum For {
     /// A screen.

@@ -132,7 +132,7 @@ impl Blocks {
         })
     }
 
-    /// Which of those kept are shown: at most so many, with ends of phases and extremes.
+    /// Indices of the profiles to show: at most `most`, including ends of phases and extremes.
     fn shown(&self, most: usize) -> Vec<usize> {
         let extreme = if self.kept.len() > most {
             self.extreme()

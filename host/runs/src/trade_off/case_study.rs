@@ -299,7 +299,7 @@ impl<'a> Cases<'a> {
         Timing::Within(Duration::from_secs_f64(times * self.unit))
     }
 
-    /// Takes the shorter plan. Returns the note that says so.
+    /// Takes the shorter plan. Returns the note about it.
     fn shorten(&mut self) -> String {
         self.plan = &SHORT;
         let note = format!(

@@ -1,4 +1,4 @@
-//! Which checks are made of a library, and in which order.
+//! The checks of a library in the order in which they run.
 
 use super::report::Finding;
 use super::verdict::Outcome;

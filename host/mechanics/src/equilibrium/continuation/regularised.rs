@@ -63,7 +63,7 @@ pub(super) struct Regularised {
     halvings: usize,
     /// The last step needed them.
     is_expected: bool,
-    /// Where these iterations start, once they have.
+    /// Number of the first regularised iteration, once there is one.
     since: Option<usize>,
     /// The regularised matrix was singular.
     is_beyond: bool,

@@ -45,7 +45,7 @@ pub(super) struct Viscous {
     standstill: (Vec<f64>, usize),
 }
 
-/// What has become of a motion.
+/// State of a viscous motion.
 #[derive(Debug)]
 enum Trial {
     /// Newton iterations have not come to a standstill yet.

@@ -50,7 +50,7 @@ struct Differences {
     worst: Option<Entry>,
     /// The largest difference between the two sides.
     disagreement: f64,
-    /// Where the flux does not change at all, though the tangent has a little stiffness.
+    /// Row and column of a small entry of the tangent although differences of the stress are zero there.
     left: Option<(usize, usize)>,
 }
 
