@@ -12,7 +12,7 @@ const MOST_ENDS: usize = 4;
 /// A mesh, and what its names mean.
 #[derive(Clone, Debug)]
 pub struct MeshTable {
-    /// Title: the file's name.
+    /// Path of its file, with the variant of a case.
     pub title: String,
     /// The mesh.
     pub mesh: Mesh,

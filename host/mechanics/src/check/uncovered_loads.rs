@@ -59,8 +59,8 @@ pub(super) fn warnings(problem: &Problem) -> Vec<String> {
 }
 
 impl Load<'_> {
-    /// Whether its line bounds active elements, lies inside them, or has none. `sides` gives the number of active elements
-    /// that have a node in the middle of a side.
+    /// Whether its line bounds active elements, lies inside them, or has none. `sides` gives the number of active
+    /// elements that have a node in the middle of a side.
     fn stands_in(&self, mesh: &Mesh, sides: impl Fn(usize) -> usize) -> Stands {
         let edges = mesh.lines.get(self.line).into_iter();
         let edges = edges.flat_map(|line| &line.edges);

@@ -120,7 +120,8 @@ impl Pile {
     }
 }
 
-/// Whether the shaft slides or yields, from the failure modes of its points and from the worst mechanism if it lies there.
+/// Whether the shaft slides or yields, from the failure modes of its points and from the worst mechanism if that is in
+/// the shaft.
 fn of_shaft(
     modes: &[FailureMode],
     n_points: usize,
