@@ -503,6 +503,17 @@ impl Recorder {
         self.pile.as_ref().and_then(PileRecord::soft_shaft)
     }
 
+    /// Largest force out of balance of steps with a pile, as a share of the pile's largest load, in words.
+    pub fn out_of_balance(&self) -> Option<String> {
+        let phases = &self.summary.course.phases;
+        let residual = |name: &str| {
+            let mut records = phases.iter().map(|(record, _)| record);
+            let record = records.find(|record| record.name == name)?;
+            Some(record.residual_force)
+        };
+        self.pile.as_ref()?.out_of_balance(residual)
+    }
+
     /// The error of the mesh at the end of the last phase, in words, if it was asked for.
     pub fn mesh_error(&self) -> Option<String> {
         self.summary.course.mesh_errors.last().map(OfPhase::words)

@@ -285,6 +285,7 @@ pub struct Phase {
     pub(crate) tolerated_steps: usize,
     pub(crate) tolerated_residual: Option<f64>,
     pub(crate) tolerated_force: Option<f64>,
+    pub(crate) residual_force: Option<f64>,
     pub(crate) by_force_steps: usize,
     pub(crate) by_force_open: LeftOpen,
     pub(crate) arc_length_steps: usize,

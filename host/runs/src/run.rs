@@ -342,6 +342,9 @@ impl Follower<'_> {
         for warning in beyond.iter().chain(&unreliable).chain(&soft) {
             self.say(warning);
         }
+        if let Some(left) = self.results.out_of_balance() {
+            self.observer.note(&left);
+        }
         let outcome = outcome.map_err(|error| {
             if let mechanics::Error::NoEquilibrium(none) = &error
                 && let Some(plunge) = self.results.plunge(simulation, none)

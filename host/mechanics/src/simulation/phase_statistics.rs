@@ -40,6 +40,9 @@ pub struct PhaseRecord {
     pub tolerated_residual: f64,
     /// The same as a force: 2-norm over the nodes of a body, in the units of the case.
     pub tolerated_force: f64,
+    /// The largest force that a step left out of balance: 2-norm over the nodes of a body, in the units of the case.
+    #[serde(default)]
+    pub residual_force: f64,
     /// Steps whose last correction is above its tolerance: the residual alone decided.
     pub by_force: usize,
     /// The most that they left open.

@@ -264,10 +264,13 @@ impl Simulation {
             record.unsettled = record.unsettled.max(above.unwrap_or(0.0));
         }
         record.round_off = record.round_off.max(success.round_off);
+        let tolerance = self.problem.settings.force_tolerance;
+        let scale = success.scales.iter().copied().fold(0.0, f64::max);
+        let residual = success.iterations.last().map_or(0.0, |last| last.residual);
+        record.residual_force = record.residual_force.max(residual * scale);
         if success.tolerated > 0.0 {
             record.tolerated += 1;
             record.tolerated_residual = record.tolerated_residual.max(success.tolerated);
-            let scale = success.scales.iter().copied().fold(0.0, f64::max);
             let force = success.tolerated * scale;
             record.tolerated_force = record.tolerated_force.max(force);
             if record.tolerated == 1 {
@@ -275,7 +278,7 @@ impl Simulation {
                     place: place.clone(),
                     residual: success.tolerated,
                     force,
-                    tolerance: self.problem.settings.force_tolerance,
+                    tolerance,
                 });
             }
         }

@@ -14,6 +14,8 @@ const EXPLAINED: f64 = 0.98;
 const FEWEST: usize = 4;
 /// Elastic slip of joints above this share of the settlement changes the result.
 const SLIP: f64 = 0.1;
+/// Forces out of balance are reported from this share of the pile's largest load on.
+const OUT_OF_BALANCE: f64 = 1e-3;
 /// A load that rises by less than this share of its largest value is held.
 const HELD: f64 = 0.01;
 
@@ -283,6 +285,31 @@ impl Curve {
                 100.0 * share,
                 load,
                 100.0 * SLIP
+            )
+        })
+    }
+
+    /// The largest force that a step left out of balance, as a share of the pile's largest load, in words; `residual` gives
+    /// that of a phase. `None` if it is very small.
+    pub(super) fn out_of_balance(
+        &self,
+        residual: impl Fn(&str) -> Option<f64>,
+        unit: &str,
+    ) -> Option<String> {
+        let residuals = self
+            .in_place()
+            .filter_map(|phase| Some((phase, residual(&phase.phase)?)));
+        let (phase, residual) = residuals.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let loads = self.in_place().flat_map(|phase| &phase.points);
+        let loads = loads.flat_map(|point| &point[1..]);
+        let largest = loads.fold(0.0, |m: f64, load| m.max(load.abs()));
+        let share = residual / largest;
+        (largest > 0.0 && share > OUT_OF_BALANCE).then(|| {
+            format!(
+                "pile: steps leave up to {residual:.2} {unit} out of balance (phase `{}`), {:.1} % of its largest load, \
+                 {largest:.1} {unit}; `force_tolerance` limits it",
+                phase.phase,
+                100.0 * share,
             )
         })
     }

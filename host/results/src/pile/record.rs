@@ -136,6 +136,11 @@ impl Record {
         self.curve.soft_shaft()
     }
 
+    /// Largest force out of balance, as a share of the pile's largest load, in words.
+    pub(crate) fn out_of_balance(&self, residual: impl Fn(&str) -> Option<f64>) -> Option<String> {
+        self.curve.out_of_balance(residual, self.unit())
+    }
+
     /// Writes the table of its cycles.
     ///
     /// # Errors

@@ -73,7 +73,7 @@ pub(crate) struct Stopped {
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Course {
     /// Phases, with the values of the probes after their last increments.
-    phases: Vec<(PhaseRecord, Vec<Option<f64>>)>,
+    pub(crate) phases: Vec<(PhaseRecord, Vec<Option<f64>>)>,
     last: Option<(Place, Vec<Option<f64>>)>,
     /// The phase that found the ground at rest, but for this share of its weight.
     pub(crate) at_rest: Option<(String, f64)>,
@@ -178,6 +178,7 @@ impl Progress {
             tolerated_steps: record.tolerated,
             tolerated_residual: Some(record.tolerated_residual),
             tolerated_force: Some(record.tolerated_force),
+            residual_force: Some(record.residual_force),
             by_force_steps: record.by_force,
             by_force_open: LeftOpen {
                 residual: Some(record.open.residual),
