@@ -16,6 +16,7 @@ mod misfit;
 mod model;
 mod output;
 mod parameter_block;
+mod problem;
 mod profile;
 mod propagation;
 mod rates;
@@ -28,6 +29,7 @@ pub use coordinates::Parameter;
 pub use curve::Curve;
 pub use fitted::{Fitted, FittedCurve};
 pub use least_squares::End;
+pub use problem::ResidualProblem;
 pub use profile::{Profile, Side};
 pub use stage::{Group, Landing, Optimum, Stage};
 pub use statistics::Covariance;
@@ -386,20 +388,27 @@ fn carry_out(
     })
 }
 
+/// One stage of all parameters and of all tests that are fitted.
+fn everything(model: &Model) -> Group {
+    let fitted = (0..model.tests.len()).filter(|&test| !model.tests[test].is_predicted);
+    Group {
+        name: "all".to_owned(),
+        parameters: (0..model.parameters.len()).collect(),
+        tests: fitted.collect(),
+    }
+}
+
 /// The stages of the file, or one of all.
 fn groups(calibration: &Calibration, model: &Model) -> Vec<Group> {
-    let fitted = || (0..model.tests.len()).filter(|&test| !model.tests[test].is_predicted);
+    let all = everything(model);
     let stages = &calibration.file.stage;
     if stages.is_empty() {
-        return vec![Group {
-            name: "all".to_owned(),
-            parameters: (0..model.parameters.len()).collect(),
-            tests: fitted().collect(),
-        }];
+        return vec![all];
     }
     let named = |stage: &StageInput| {
         let is_in = |names: &[Spanned<String>], name| names.iter().any(|one| one.get_ref() == name);
-        let tests = fitted()
+        let tests = all.tests.iter().copied();
+        let tests = tests
             .filter(|&test| stage.tests.is_empty() || is_in(&stage.tests, &model.tests[test].name));
         let tests: Vec<usize> = tests.collect();
         // How a curve was read is looked for wherever its test is.

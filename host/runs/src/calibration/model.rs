@@ -322,7 +322,15 @@ impl Test {
     }
 
     /// What the test computes with these values of the parameters.
-    fn rows(&self, values: &[f64], scratch: &Scratch, stop: &Stop) -> Result<Rows, Error> {
+    ///
+    /// # Errors
+    /// Those of the computation.
+    pub(super) fn rows(
+        &self,
+        values: &[f64],
+        scratch: &Scratch,
+        stop: &Stop,
+    ) -> Result<Rows, Error> {
         match self.with(values)? {
             Subject::Driver(mut driver) => {
                 driver.point_mut().stop_on(stop);
