@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Mapping
-from typing import Any, TypeVar
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +16,6 @@ from ._errors import InputError
 
 __all__ = ["CalibrationProblem"]
 
-_Found = TypeVar("_Found")
 _Values = NDArray[np.float64]
 
 
@@ -44,11 +43,12 @@ class CalibrationProblem:
         summary = calibration.summary
         self._arguments = (os.path.abspath(file), None if set is None else dict(set), variant)
         self._core = self._read()
-        self.names: list[str] = self._core.names
+        names, bounds, start = zip(*self._core.parameters)
+        self.names: list[str] = list(names)
         """Names of the parameters."""
-        self.bounds: _Values = np.array(self._core.bounds, dtype=np.float64)
+        self.bounds: _Values = np.array(bounds)
         """Least and greatest values, shape (parameters, 2); infinite without one."""
-        self.start: _Values = np.array(self._core.start, dtype=np.float64)
+        self.start: _Values = np.array(start)
         """Values that the command starts from."""
         self.best: _Values = calibration.values
         """Values that the command found."""
@@ -63,13 +63,13 @@ class CalibrationProblem:
 
         Raises InputError for values outside `bounds`, LawError or NoEquilibriumError where a test has no answer.
         """
-        return self._of(self._core.residuals, theta)
+        return np.array(self._of(self._core.residuals, theta))
 
     def jacobian(self, theta: ArrayLike) -> _Values:
         """Derivatives of `residuals` by the parameters, shape (points, parameters). They follow a driver whose law
         gives rates; else they are central differences with the step of the file, one-sided at bounds. Raises as
         `residuals`."""
-        return self._of(self._core.jacobian, theta)
+        return np.reshape(self._of(self._core.jacobian, theta), (len(self.names), -1)).T
 
     def log_likelihood(self, theta: ArrayLike, scatter: float | None = None) -> float:
         """Logarithm of the probability density of the measured values, normal and independent, with `scatter`
@@ -77,7 +77,7 @@ class CalibrationProblem:
 
         Weights are no information and do not count. It is -inf outside `bounds` and where a test has no answer.
         """
-        return self._of(self._core.log_likelihood, theta, self.scatter if scatter is None else scatter)
+        return float(self._of(self._core.log_likelihood, theta, self.scatter if scatter is None else scatter))
 
     def __repr__(self) -> str:
         return f"<pilum.CalibrationProblem of {', '.join(self.names)}: {self._core.points} points>"
@@ -93,9 +93,9 @@ class CalibrationProblem:
         with tempfile.TemporaryDirectory() as folder:
             return _pilum.Residuals(*self._arguments, folder)
 
-    def _of(self, function: Callable[..., _Found], theta: ArrayLike, *more: float) -> _Found:
+    def _of(self, function: Any, theta: ArrayLike, *more: float) -> Any:
         values = np.asarray(theta, dtype=np.float64)
         if values.shape != self.start.shape:
             raise InputError(f"theta has shape {values.shape}, expected {self.start.shape}")
         with tempfile.TemporaryDirectory() as folder:
-            return function(values.tolist(), *more, folder)
+            return function(values.tolist(), folder, *more)

@@ -388,27 +388,20 @@ fn carry_out(
     })
 }
 
-/// One stage of all parameters and of all tests that are fitted.
-fn everything(model: &Model) -> Group {
-    let fitted = (0..model.tests.len()).filter(|&test| !model.tests[test].is_predicted);
-    Group {
-        name: "all".to_owned(),
-        parameters: (0..model.parameters.len()).collect(),
-        tests: fitted.collect(),
-    }
-}
-
 /// The stages of the file, or one of all.
 fn groups(calibration: &Calibration, model: &Model) -> Vec<Group> {
-    let all = everything(model);
+    let fitted = || (0..model.tests.len()).filter(|&test| !model.tests[test].is_predicted);
     let stages = &calibration.file.stage;
     if stages.is_empty() {
-        return vec![all];
+        return vec![Group {
+            name: "all".to_owned(),
+            parameters: (0..model.parameters.len()).collect(),
+            tests: fitted().collect(),
+        }];
     }
     let named = |stage: &StageInput| {
         let is_in = |names: &[Spanned<String>], name| names.iter().any(|one| one.get_ref() == name);
-        let tests = all.tests.iter().copied();
-        let tests = tests
+        let tests = fitted()
             .filter(|&test| stage.tests.is_empty() || is_in(&stage.tests, &model.tests[test].name));
         let tests: Vec<usize> = tests.collect();
         // How a curve was read is looked for wherever its test is.

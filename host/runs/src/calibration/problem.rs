@@ -5,7 +5,7 @@ use super::fit::Search;
 use super::least_squares::Problem as _;
 use super::model::Model;
 use super::stage::Group;
-use super::{Options, everything};
+use super::{Options, groups};
 use crate::Error;
 use crate::experiment::{Kept, Scratch};
 use crate::variants::keep;
@@ -23,28 +23,25 @@ pub struct ResidualProblem {
     group: Group,
 }
 
-/// Only so many computations are remembered.
-const MOST_KEPT: usize = 1000;
-
 impl ResidualProblem {
-    /// Reads all files and computes each test once, with the values that the command starts from. Runs of cases are in
-    /// `folder` for a while.
+    /// Reads all files and computes each test once, with the values that the command starts from. Runs of cases are in the
+    /// folder of the results for a while.
     ///
     /// # Errors
     /// Bad input; several variants and none chosen; a test that cannot be computed with the starting values.
-    pub fn new(path: &Path, options: &Options, folder: &Path) -> Result<Self, Error> {
+    pub fn new(path: &Path, options: &Options) -> Result<Self, Error> {
         let mut all = Calibration::load_with(path, &options.settings)?;
         keep(&mut all, options.variant.as_deref(), |one| {
             one.variant.clone()
         })?;
-        let [calibration] = all.as_slice() else {
-            let names: Vec<&str> = all.iter().filter_map(|c| c.variant.as_deref()).collect();
-            let names = names.join(", ");
-            let message = format!("{} has the variants {names}: choose one", path.display());
+        let (Some(mut calibration), []) = (all.pop(), all.as_slice()) else {
+            let message = format!("{} has variants: `variant` chooses one", path.display());
             return Err(Error::usage(message));
         };
-        let model = Model::new(calibration, &options.opener, folder, &options.stop)?;
-        let group = everything(&model);
+        let folder = options.folder(&calibration);
+        let model = Model::new(&calibration, &options.opener, &folder, &options.stop)?;
+        calibration.file.stage.clear();
+        let group = groups(&calibration, &model).remove(0);
         Ok(Self { model, group })
     }
 
@@ -55,8 +52,7 @@ impl ResidualProblem {
 
     /// Number of residuals.
     pub fn n_points(&self) -> usize {
-        let tests = self.group.tests.iter();
-        tests.map(|&test| self.model.tests[test].n_points()).sum()
+        self.model.weights(&self.group.tests).len()
     }
 
     /// Sets who may want the next calls to stop, and the folder of their runs.
@@ -66,9 +62,7 @@ impl ResidualProblem {
     pub fn begin(&mut self, folder: &Path, stop: &Stop) -> Result<(), Error> {
         self.model.stop = stop.clone();
         self.model.scratch = Scratch::new(folder, stop)?;
-        if self.model.kept.len() > MOST_KEPT {
-            self.model.kept = Kept::default();
-        }
+        self.model.kept = Kept::default();
         Ok(())
     }
 
@@ -96,12 +90,11 @@ impl ResidualProblem {
     pub fn jacobian(&mut self, values: &[f64]) -> Result<DMatrix<f64>, Error> {
         let here = DVector::from_vec(self.residuals(values)?);
         let place = self.place(values)?;
-        let moving = 0..place.len();
         let mut search = Search {
             model: &mut self.model,
             group: &self.group,
             all: place.clone(),
-            moving: moving.collect(),
+            moving: (0..place.len()).collect(),
             is_one_sided: false,
         };
         let Some(mut jacobian) = search.jacobian(&place, &here)? else {
@@ -156,11 +149,9 @@ impl ResidualProblem {
 
     /// Why a test has no answer: the error of its computation, if that fails.
     fn refusal(&self, test: usize, place: &[f64], why: &str) -> Error {
-        let (model, values) = (&self.model, self.model.values(place));
-        let again = model.tests[test].rows(&values, &model.scratch, &model.stop);
-        let name = &model.tests[test].name;
-        again
-            .err()
-            .unwrap_or_else(|| Error::library(format!("test `{name}`: {why}")))
+        let test = &self.model.tests[test];
+        let again = test.rows(&self.model.values(place), &self.model.scratch);
+        let told = || Error::library(format!("test `{}`: {why}", test.name));
+        again.err().unwrap_or_else(told)
     }
 }
