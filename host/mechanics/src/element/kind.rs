@@ -29,6 +29,8 @@ pub struct Kind {
     pub(crate) fine: Points,
     /// How it is divided into four.
     pub(crate) division: fn() -> Division,
+    /// Derivatives of (x, y) by ξ and by η at (ξ, η), of an element whose nodes lie at these places.
+    pub(crate) tangents: fn([f64; 2], &[[f64; 2]]) -> [[f64; 2]; 2],
     /// Elements of the kind.
     pub(crate) build: fn(Elements<'_>) -> Result<Box<dyn Kinematics>, BadShape>,
 }
