@@ -128,6 +128,102 @@ fn says_what_is_refused() {
     );
 }
 
+/// A square of two triangles of 6 nodes in a surface, fixed below; the middle of the diagonal is node 9.
+const SQUARE: &str = r#"$MeshFormat
+2.2 0 8
+$EndMeshFormat
+$PhysicalNames
+2
+2 1 "ground"
+1 2 "bottom"
+$EndPhysicalNames
+$Nodes
+9
+1 0 0 0
+2 1 0 0
+3 1 1 0
+4 0 1 0
+5 0.5 0 0
+6 1 0.5 0
+7 0.5 1 0
+8 0 0.5 0
+9 0.5 0.5 0
+$EndNodes
+$Elements
+3
+1 8 2 2 1 1 2 5
+2 9 2 1 1 1 2 3 5 6 9
+3 9 2 1 1 1 3 4 9 7 8
+$EndElements
+"#;
+
+#[test]
+fn refuses_the_middle_nodes_that_a_run_refuses() {
+    let place = Place::new();
+    place.write(
+        "case.toml",
+        r#"analysis = "plane_strain"
+mesh.file = "a.msh"
+laws.soil = { law = "elastic", parameters = { young_modulus = 1e4, poisson_ratio = 0.3 } }
+groups.ground = { formulation = "solid", law = "soil" }
+supports = [{ line = "bottom", fixed = ["x", "y"] }]
+phase = [{ name = "only", increments = 1 }]
+"#,
+    );
+    // The Jacobian of the lower triangle is 1 − 4d(1 − ξ − η) with the middle of its lower side at (1/2, d), and
+    // 1 + 4s(1 − 2ξ − η) with it at (1/2 + s, 0): zero at its first corner for d = 1/4 and s = −1/4.
+    for (at, is_taken, is_noted) in [
+        ("0.5 0", true, false),
+        ("0.3 0", true, true),
+        ("0.26 0", true, true),
+        ("0.24 0", false, true),
+        ("0.5 0.2", true, false),
+        ("0.5 0.24", true, false),
+        ("0.5 0.26", false, true),
+        ("0.5 -0.24", true, false),
+        ("0.5 -0.4", true, true),
+        ("0.5 -1.2", true, true),
+    ] {
+        place.write(
+            "a.msh",
+            SQUARE.replace("5 0.5 0 0\n", &format!("5 {at} 0\n")),
+        );
+        let [mesh, run] = [["mesh", "a.msh"], ["run", "case.toml"]].map(|call| place.run(&call));
+        let code = if is_taken { DONE } else { BAD_INPUT };
+        assert_eq!(mesh.code, Some(code), "{at}: {}", mesh.stderr);
+        assert_eq!(run.code, Some(code), "{at}: {}", run.stderr);
+        let note = "1 middle node lies farther than 1/8 of its side";
+        assert_eq!(
+            mesh.stdout.contains(note),
+            is_noted,
+            "{at}: {}",
+            mesh.stdout
+        );
+        let row = words(&mesh, "ground").join(" ");
+        let least: f64 = row.rsplit(' ').next().unwrap().parse().unwrap();
+        assert_eq!(least > 0.0, is_taken, "{at}: {row}");
+    }
+}
+
+#[test]
+fn elements_that_lie_on_each_other_are_named() {
+    // The second triangle once more, of nodes of its own.
+    let nodes = "10 0 0 0\n11 1 1 0\n12 0 1 0\n13 0.5 0.5 0\n14 0.5 1 0\n15 0 0.5 0\n$EndNodes";
+    let twice = SQUARE
+        .replace("$Nodes\n9", "$Nodes\n15")
+        .replace("$EndNodes", nodes)
+        .replace("$Elements\n3", "$Elements\n4")
+        .replace("$EndElements", "4 9 2 1 1 10 11 12 13 14 15\n$EndElements");
+    let outcome = shown(&twice);
+    for part in [
+        "6 nodes are where another one is",
+        "elements 3 and 4 lie on each other",
+        "`Coherence;`",
+    ] {
+        assert!(outcome.stdout.contains(part), "{part}\n{}", outcome.stdout);
+    }
+}
+
 #[test]
 fn shows_and_draws_the_mesh_of_a_case() {
     let place = Place::new();

@@ -19,7 +19,7 @@ fn case() -> PathBuf {
 }
 
 /// Python of the environment, if there is one.
-fn python() -> Option<PathBuf> {
+pub(crate) fn python() -> Option<PathBuf> {
     let folder = std::env::var_os("PILUM_DOLFINX").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../target/dolfinx"),
         PathBuf::from,

@@ -1,5 +1,6 @@
 //! Cases exported to other programs, run there, and read back: the table is that of a run here.
 
+use crate::distributed::python;
 use crate::{KRATOS, OPENGEOSYS, beside, installed, is_there};
 use exchange::{Model, Program};
 use input::Case;
@@ -46,6 +47,11 @@ fn run_there(program: Program, folder: &Path) {
         Program::Calculix => {
             let mut command = Command::new("ccx");
             command.arg("model");
+            command
+        }
+        Program::Dolfinx => {
+            let mut command = Command::new(python().unwrap());
+            command.arg("run_dolfinx.py");
             command
         }
     };
@@ -164,6 +170,25 @@ fn calculix_gives_our_table() {
     );
 }
 
+#[test]
+fn dolfinx_gives_our_table() {
+    if python().is_none() {
+        return;
+    }
+    let (pile, block) = (bonded_pile(), beside("block.toml"));
+    for variant in ["m200_elastic", "m200"] {
+        assert_same(Program::Dolfinx, &case(&pile, Some(variant), &[]), ITERATED);
+    }
+    for setting in [
+        "analysis=\"plane_strain\"",
+        "groups.soil.law=\"soil\"",
+        REDUCED,
+        "laws.soil.parameters.scheme=\"explicit\"",
+    ] {
+        assert_same(Program::Dolfinx, &case(&block, None, &[setting]), ITERATED);
+    }
+}
+
 /// The vertical force of a pressure on a ring, of the whole turn: p π (r_2² − r_1²).
 #[test]
 fn forces_are_of_the_whole_turn() {
@@ -200,7 +225,9 @@ fn what_cannot_be_carried_is_named() {
             .map(|key| key.key)
             .collect::<Vec<_>>()
     };
-    assert_eq!(left(Program::Ogs), ["solver", "probes.s"]);
+    for program in [Program::Ogs, Program::Dolfinx] {
+        assert_eq!(left(program), ["solver", "probes.s"]);
+    }
     let points = [
         "groups.soil.integration",
         "groups.block.integration",

@@ -152,6 +152,10 @@ def test_a_case_is_a_test(here: Path) -> None:
     problem = pilum.CalibrationProblem("push.toml", calibration=calibration)
     residuals = problem.residuals(problem.best)
     assert residuals @ residuals == pytest.approx(calibration.sum_of_squares, rel=1e-9)
+    # Differences with half the step of cases: the error of both falls with its square, 1e-6.
+    sides = [problem.residuals(problem.best * factor) for factor in (1.0005, 0.9995)]
+    differences = (sides[0] - sides[1]) / (1e-3 * problem.best[0])
+    assert np.allclose(problem.jacobian(problem.best)[:, 0], differences, atol=0.0, rtol=1e-4)
 
 
 def test_derivatives_and_likelihood(boxes: tuple[pilum.Calibration, pilum.CalibrationProblem]) -> None:
@@ -178,6 +182,31 @@ def test_derivatives_and_likelihood(boxes: tuple[pilum.Calibration, pilum.Calibr
     assert problem.log_likelihood(-problem.best) == -np.inf
     with pytest.raises(pilum.InputError, match="shape"):
         problem.log_likelihood([1.0])
+    for function in (problem.residuals, problem.jacobian):
+        with pytest.raises(pilum.InputError, match="`shear_stiffness` is -1, outside .10000, 1000000."):
+            function([-1.0, 5.0, 31.0])
+        with pytest.raises(pilum.InputError, match="`cohesion` is NaN"):
+            function([1e5, np.nan, 31.0])
+
+
+def test_rates_of_the_law_are_differences_that_need_no_step(
+    boxes: tuple[pilum.Calibration, pilum.CalibrationProblem],
+) -> None:
+    _, problem = boxes
+    # Away from a place where a box begins to slide at a measured point.
+    theta = np.array([0.93e5, 5.3, 30.3])
+    jacobian = problem.jacobian(theta)
+    for place, value in enumerate(theta):
+        # Central differences of a computed curve, which is not linear: their error falls with the square of the step.
+        errors = []
+        for step in (1e-3, 1e-4):
+            sides = [theta.copy(), theta.copy()]
+            sides[0][place] += step * value
+            sides[1][place] -= step * value
+            change = problem.residuals(sides[0]) - problem.residuals(sides[1])
+            errors.append(np.abs(change / (2.0 * step * value) - jacobian[:, place]).max())
+        assert errors[1] < 1e-6 * np.abs(jacobian[:, place]).max()
+        assert errors[1] < 0.02 * errors[0] + 1e-8 * np.abs(jacobian[:, place]).max()  # the driver's tolerance
 
 
 def test_scipy_finds_what_the_command_finds(boxes: tuple[pilum.Calibration, pilum.CalibrationProblem]) -> None:

@@ -40,7 +40,7 @@ pub fn import(folder: &Path, out: Option<&Path>) -> Result<PathBuf, Error> {
         .map_err(|error| unreadable(&path, error.to_string()))?;
     let found = match model.program {
         Program::Ogs => of_opengeosys(folder, &model),
-        Program::Kratos => of_kratos(folder, &model),
+        Program::Kratos | Program::Dolfinx => of_kratos(folder, &model),
         Program::Calculix => of_calculix(folder, &model),
     }?;
     if found.is_empty() {

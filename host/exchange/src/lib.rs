@@ -6,6 +6,7 @@
 mod calculix;
 mod columns;
 mod course;
+mod dolfinx;
 mod import;
 mod kratos;
 mod limits;
@@ -31,7 +32,14 @@ const NAMES: [&str; 6] = [
     "nodes.csv",
     "bulk.vtu",
 ];
-const STARTS: [&str; 5] = ["model.", "result_", "held_", "load_", "run_kratos"];
+const STARTS: [&str; 6] = [
+    "model.",
+    "result_",
+    "held_",
+    "load_",
+    "run_kratos",
+    "run_dolfinx",
+];
 /// Name of the model's file in the folder.
 const MODEL: &str = "model.json";
 
@@ -45,6 +53,8 @@ pub enum Program {
     Kratos,
     /// CalculiX; linear elastic laws only.
     Calculix,
+    /// DOLFINx, with laws by Pilum's package for Python.
+    Dolfinx,
 }
 
 impl Program {
@@ -54,13 +64,14 @@ impl Program {
             Self::Ogs => "OpenGeoSys",
             Self::Kratos => "Kratos",
             Self::Calculix => "CalculiX",
+            Self::Dolfinx => "DOLFINx",
         }
     }
 
     /// Whether its elements start free of stress here: the initial stress of linear elastic ground is carried as the
     /// nodal forces that balance it.
     pub(crate) fn starts_free_of_stress(self) -> bool {
-        self != Self::Ogs
+        matches!(self, Self::Kratos | Self::Calculix)
     }
 
     /// The command that runs the files, in their folder.
@@ -69,6 +80,7 @@ impl Program {
             Self::Ogs => "ogs model.prj -o .",
             Self::Kratos => "python run_kratos.py",
             Self::Calculix => "ccx model",
+            Self::Dolfinx => "python run_dolfinx.py",
         }
     }
 }
@@ -89,6 +101,7 @@ pub fn export(case: &Case, to: Program, folder: &Path) -> Result<Vec<NotCarried>
         Program::Ogs => opengeosys::files(&model),
         Program::Kratos => kratos::files(),
         Program::Calculix => calculix::files(&model),
+        Program::Dolfinx => dolfinx::files(),
     };
     for (name, text) in files {
         replace(&folder.join(name), text)?;

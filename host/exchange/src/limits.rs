@@ -1,7 +1,7 @@
 //! What cannot be carried to another program: at all, or without the rest losing its meaning.
 
 use crate::model::{Held, Load, Parameter, constant, parameters};
-use crate::{Error, Program, kratos, opengeosys};
+use crate::{Error, Program, dolfinx, kratos, opengeosys};
 use input::Case;
 use mechanics::problem::{Drainage, ElementGroup, Formulation, Integration, Phase, Problem};
 use serde::{Deserialize, Serialize};
@@ -103,11 +103,17 @@ impl Check<'_> {
     /// CalculiX has no plane element of nine nodes.
     fn elements(&self, number: usize, problem: &Problem) -> Result<(), InputError> {
         let mut own = problem.mesh.solids.iter().filter(|s| s.group == number);
-        let known = self.to != Program::Calculix || own.all(|solid| solid.nodes().len() < 9);
-        match self.case.file.groups.get_index(number) {
-            Some((name, _)) if !known => {
+        let unknown = match self.to {
+            Program::Calculix => own
+                .any(|solid| solid.nodes().len() == 9)
+                .then_some("an element of nine nodes"),
+            Program::Dolfinx => dolfinx::unknown(&problem.mesh, number),
+            _ => None,
+        };
+        match (self.case.file.groups.get_index(number), unknown) {
+            (Some((name, _)), Some(what)) => {
                 let key = format!("groups.{}", name.get_ref());
-                Err(self.refuse(name.span(), &key, "an element of nine nodes"))
+                Err(self.refuse(name.span(), &key, what))
             }
             _ => Ok(()),
         }
@@ -202,6 +208,7 @@ impl Check<'_> {
             Program::Calculix => {
                 (!is_elastic(group)).then(|| format!("law `{id}`, which is not linear elastic,"))
             }
+            Program::Dolfinx => None,
         }
     }
 
@@ -298,6 +305,7 @@ impl Check<'_> {
                 reason: reason.to_owned(),
             });
         };
+        let has_triangles = problem.mesh.solids.iter().any(|s| s.n_corners() == 3);
         let points = |group: &ElementGroup| group.integration == Some(Integration::Reduced);
         for (written, group) in file.groups.iter().zip(&problem.groups) {
             let key = format!("groups.{}.integration", group.name);
@@ -307,6 +315,12 @@ impl Check<'_> {
             let is_full = group.integration == Some(Integration::Full);
             if self.to == Program::Kratos && !reduced {
                 leave(span, key, "taken as `reduced`: 2 × 2 points");
+            } else if self.to == Program::Dolfinx && has_triangles && !reduced {
+                leave(
+                    span,
+                    key,
+                    "taken as `reduced`: 3 points, strains as they are",
+                );
             } else if !reduced && !is_full {
                 leave(
                     span,

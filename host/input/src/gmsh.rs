@@ -7,6 +7,7 @@ mod cursor;
 mod format;
 mod kind;
 mod overview;
+mod twins;
 mod words;
 
 pub use overview::{Overview, overview};

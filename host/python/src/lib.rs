@@ -15,6 +15,7 @@ mod law;
 mod point;
 mod posed;
 mod process;
+mod residuals;
 mod run;
 mod simulation;
 mod state;
@@ -28,6 +29,7 @@ use pyo3::prelude::*;
 fn _pilum(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<law::Law>()?;
+    module.add_class::<residuals::Residuals>()?;
     module.add_class::<state::State>()?;
     module.add_class::<simulation::Simulation>()?;
     module.add_class::<simulation::SimulationState>()?;

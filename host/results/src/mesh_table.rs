@@ -2,9 +2,13 @@
 
 use mechanics::mesh::{Line, Mesh, Solid};
 use mechanics::problem::{Analysis, Axis};
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt::{self, Display, Write};
 use text::counted;
+
+/// A middle node is far off if it is farther than these parts of its side, along it and across it, from the middle
+/// between the ends. A quarter along the side, the Jacobian is zero at its end.
+const FAR_OFF: [f64; 2] = [0.125, 0.25];
 
 /// Ends of a line that are listed.
 const MOST_ENDS: usize = 4;
@@ -50,7 +54,8 @@ impl MeshTable {
         let (n, where_) = (bad.len(), self.place(first));
         let elements = if n == 1 { "element is" } else { "elements are" };
         Some(format!(
-            "{n} {elements} degenerate: the Jacobian is not positive{}; the first is {where_}",
+            "{n} {elements} degenerate: the Jacobian is not positive inside or at a node{}; the first is \
+             {where_}",
             if self.analysis == Analysis::Axisymmetric {
                 ", or they reach across the axis"
             } else {
@@ -64,6 +69,31 @@ impl MeshTable {
         let solids = self.mesh.solids.iter().enumerate();
         let bad = solids.filter(|(_, s)| s.is_degenerate(self.analysis, &self.mesh.nodes));
         bad.map(|(number, _)| number).collect()
+    }
+
+    /// Middle nodes that lie far off.
+    fn far_middles(&self) -> Option<String> {
+        let mesh = &self.mesh;
+        let solids = mesh.solids.iter().enumerate();
+        let sides = solids.flat_map(|(solid, own)| own.edges().map(move |side| (solid, side)));
+        let mut seen = HashSet::new();
+        let far: Vec<(usize, usize)> = sides
+            .filter(|(_, side)| {
+                let off = mesh.off_middle(*side);
+                off[0] > FAR_OFF[0] || off[1] > FAR_OFF[1]
+            })
+            .map(|(solid, [.., middle])| (solid, middle))
+            .filter(|(_, middle)| seen.insert(*middle))
+            .collect();
+        let (solid, middle) = *far.first()?;
+        let verb = if far.len() == 1 { "lies" } else { "lie" };
+        Some(format!(
+            "{} {verb} farther than 1/8 of its side along it, or 1/4 across it, from the middle between the ends, the first at \
+             {}, {}: strains are less accurate there, and at 1/4 along the side the Jacobian is zero at its end",
+            counted(far.len(), "middle node"),
+            point(mesh.nodes[middle]),
+            self.place(solid)
+        ))
     }
 
     /// An element in words.
@@ -225,12 +255,16 @@ impl Display for MeshTable {
         if !self.mesh.lines.is_empty() {
             table(f, ["line", "edges", "length, m", "ends"], &self.lines())?;
         }
-        if !self.notes.is_empty() {
+        let mut notes = self
+            .notes
+            .iter()
+            .cloned()
+            .chain(self.far_middles())
+            .peekable();
+        if notes.peek().is_some() {
             writeln!(f)?;
         }
-        self.notes
-            .iter()
-            .try_for_each(|note| writeln!(f, "note: {note}"))
+        notes.try_for_each(|note| writeln!(f, "note: {note}"))
     }
 }
 

@@ -4,6 +4,7 @@ use super::Wanted;
 use super::contents::{Contents, Element, Node};
 use super::cursor::Fault;
 use super::kind::{Kind, MOST_NODES};
+use super::twins::twins;
 use super::words::{Faults, counted, list};
 use indexmap::IndexMap;
 use mechanics::element;
@@ -21,7 +22,10 @@ type Ends = [usize; 2];
 /// Largest coordinate, m.
 const FARTHEST: f64 = 1e9;
 /// Lengths within this fraction of the mesh's size count as zero.
-const NOTHING: f64 = 1e-9;
+pub(super) const NOTHING: f64 = 1e-9;
+/// What joins elements that do not fit together.
+const JOIN: &str = "`Coherence;` in Gmsh, before the mesh is made, makes one of two curves there; `Coherence Mesh;` joins only \
+                    sides with the same ends and middle";
 
 /// A side of an element.
 #[derive(Clone, Copy, Debug)]
@@ -98,7 +102,7 @@ pub(super) fn assemble(contents: &Contents<'_>, wanted: &Wanted<'_>) -> Result<A
     if wanted.is_case {
         assembly.note_lines();
     }
-    assembly.note_cracks(&mesh);
+    assembly.note_twins(&mesh);
     let n_of_file = contents.nodes.len();
     let mut kept: Vec<usize> = number.into_keys().filter(|&n| n < n_of_file).collect();
     kept.sort_unstable();
@@ -414,7 +418,7 @@ impl<'a> Assembly<'a> {
         let element = self.taken[owner].0;
         let message = format!(
             "the middle of a side of {} is a corner of another element: the mesh \
-             does not fit together there",
+             does not fit together there ({JOIN})",
             self.contents.element(element)
         );
         self.fault(element, &message)
@@ -525,26 +529,17 @@ impl<'a> Assembly<'a> {
     }
 
     /// Says if nodes are at one place without being one: nothing holds elements together there.
-    fn note_cracks(&mut self, mesh: &Mesh) {
-        let size = mesh.longer_side();
-        let grain = if size > 0.0 { NOTHING * size } else { 1.0 };
-        let mut known = HashSet::new();
-        let mut twins = 0;
-        let mut first = None;
-        for node in &mesh.nodes {
-            let key = node.map(|c| (c / grain).round() as i64);
-            if !known.insert(key) {
-                twins += 1;
-                first.get_or_insert(*node);
-            }
-        }
-        if let Some([x, y]) = first {
-            self.notes.push(format!(
-                "{} where another one is, first at ({x}, {y}): elements are not joined there \
-                 (`Coherence Mesh` in Gmsh joins them)",
-                counted(twins, "node", " is", "s are")
-            ));
-        }
+    fn note_twins(&mut self, mesh: &Mesh) {
+        let Some(twins) = twins(mesh) else { return };
+        let [x, y] = twins.first;
+        let upon = twins.upon.map_or_else(String::new, |pair| {
+            let [a, b] = pair.map(|number| self.taken[number].0);
+            format!("; {} lie on each other", self.contents.two_elements(a, b))
+        });
+        self.notes.push(format!(
+            "{} where another one is, first at ({x}, {y}): elements are not joined there{upon} ({JOIN})",
+            counted(twins.n, "node", " is", "s are")
+        ));
     }
 }
 

@@ -29,9 +29,14 @@ pub struct Kind {
     pub(crate) fine: Points,
     /// How it is divided into four.
     pub(crate) division: fn() -> Division,
+    /// Derivatives of (x, y) by ξ and by η at (ξ, η), of an element whose nodes lie at these places.
+    pub(crate) tangents: Tangents,
     /// Elements of the kind.
     pub(crate) build: fn(Elements<'_>) -> Result<Box<dyn Kinematics>, BadShape>,
 }
+
+/// Derivatives of (x, y) by ξ and by η at a place, from places of nodes.
+type Tangents = fn([f64; 2], &[[f64; 2]]) -> [[f64; 2]; 2];
 
 /// Integration points of an element, and its strains there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -18,6 +18,7 @@ pub static QUAD8: Kind = Kind {
     best: Points::at(2, 2),
     fine: Points::at(3, 3),
     division,
+    tangents: |at, places| REFERENCE.tangents(at, places),
     build: |elements| elements.of(&REFERENCE),
 };
 
@@ -42,6 +43,7 @@ pub(super) const REFERENCE: Reference<8> = Reference {
     rule: quad_rule,
     exact: || quad_rule([3, 3]),
     exact_curved: || quad_rule([4, 4]),
+    places: &PLACES,
     sides: &EDGES_OF_QUAD,
     functions: Some(ProjectedOn {
         // Bilinear between the 2 × 2 points at ±1/√3.

@@ -25,6 +25,7 @@ pub static QUAD9: Kind = Kind {
     best: Points::at(2, 2),
     fine: Points::at(3, 3),
     division,
+    tangents: |at, places| REFERENCE.tangents(at, places),
     build: |elements| elements.of(&REFERENCE),
 };
 
@@ -46,6 +47,7 @@ pub(super) const REFERENCE: Reference<9> = Reference {
     rule: quad_rule,
     exact: || quad_rule([3, 3]),
     exact_curved: || quad_rule([4, 4]),
+    places: &PLACES,
     sides: &EDGES_OF_QUAD,
     functions: None,
 };

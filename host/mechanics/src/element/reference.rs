@@ -17,6 +17,8 @@ pub(super) struct Reference<const N: usize> {
     pub(super) exact_curved: fn() -> Vec<RulePoint>,
     /// The rule with these numbers of points along ξ and η ([`Points::along`](super::kind::Points)).
     pub(super) rule: fn([usize; 2]) -> Vec<RulePoint>,
+    /// Places of its nodes.
+    pub(super) places: &'static [[f64; 2]],
     /// Corners and middle of every side.
     pub(super) sides: &'static [[usize; 3]],
     /// Functions that strains can be projected on.
@@ -38,6 +40,24 @@ impl<const N: usize> Reference<N> {
     pub(super) fn is_curved(&self, places: &[[f64; 2]; N]) -> bool {
         let mut sides = self.sides.iter();
         sides.any(|side| off(side.map(|node| places[node])) > STRAIGHT)
+    }
+
+    /// Derivatives of (x, y) by ξ and by η at (ξ, η), of an element whose nodes lie here.
+    pub(super) fn tangents(&self, at: [f64; 2], places: &[[f64; 2]]) -> [[f64; 2]; 2] {
+        let (_, derivatives) = (self.shape)(at);
+        derivatives
+            .map(|by| [0, 1].map(|c| by.iter().zip(places).map(|(by, place)| by * place[c]).sum()))
+    }
+
+    /// Whether the Jacobian of an element whose nodes lie here is positive at all nodes, and within curved sides: what is
+    /// asked of it with any integration.
+    pub(super) fn is_regular(&self, places: &[[f64; 2]; N]) -> bool {
+        let inside = self.is_curved(places).then(self.exact_curved);
+        let inside = inside.iter().flatten().map(|point| point.at);
+        self.places.iter().copied().chain(inside).all(|at| {
+            let [xi, eta] = self.tangents(at, places);
+            xi[0] * eta[1] - xi[1] * eta[0] > 0.0
+        })
     }
 }
 

@@ -158,6 +158,9 @@ impl<const N: usize> Geometry<N> {
         axes: &Axes,
         Points { along, strains }: Points,
     ) -> Option<Self> {
+        if !reference.is_regular(places) {
+            return None;
+        }
         let rule = (reference.rule)(along);
         let at = |points: &[RulePoint]| -> Option<Vec<Point<N>>> {
             let point = |&RulePoint { at, weights }: &RulePoint| {

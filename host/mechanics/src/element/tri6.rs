@@ -8,14 +8,7 @@ use crate::problem::Integration;
 /// 6-node triangles, with corners (0, 0), (1, 0), (0, 1).
 pub static TRI6: Kind = Kind {
     name: "TRI6",
-    places: &[
-        [0.0, 0.0],
-        [1.0, 0.0],
-        [0.0, 1.0],
-        [0.5, 0.0],
-        [0.5, 0.5],
-        [0.0, 0.5],
-    ],
+    places: &PLACES,
     edges: &EDGES,
     gmsh: 9,
     vtk: 22,
@@ -35,8 +28,18 @@ pub static TRI6: Kind = Kind {
     best: Points::at(3, 1),
     fine: Points::at(7, 1),
     division,
+    tangents: |at, places| REFERENCE.tangents(at, places),
     build: |elements| elements.of(&REFERENCE),
 };
+
+const PLACES: [[f64; 2]; 6] = [
+    [0.0, 0.0],
+    [1.0, 0.0],
+    [0.0, 1.0],
+    [0.5, 0.0],
+    [0.5, 0.5],
+    [0.0, 0.5],
+];
 
 const EDGES: [[usize; 3]; 3] = [[0, 1, 3], [1, 2, 4], [2, 0, 5]];
 
@@ -48,6 +51,7 @@ pub(super) const REFERENCE: Reference<6> = Reference {
     rule: |[n, _]| triangle_rule(n),
     exact: || triangle_rule(6),
     exact_curved: collapsed_rule,
+    places: &PLACES,
     sides: &EDGES,
     functions: Some(ProjectedOn {
         // Linear between the points with area coordinates (2/3, 1/6, 1/6).

@@ -26,6 +26,17 @@ impl Mesh {
         };
         to(a, middle) + to(middle, b)
     }
+
+    /// How far the middle node of an edge (first end, second end, middle) lies off the middle between its ends: along it
+    /// and across it, as parts of their distance.
+    pub fn off_middle(&self, edge: [usize; 3]) -> [f64; 2] {
+        let [a, b, m] = edge.map(|node| self.nodes[node]);
+        let along = [0, 1].map(|c| b[c] - a[c]);
+        let off = [0, 1].map(|c| m[c] - f64::midpoint(a[c], b[c]));
+        let square = along[0] * along[0] + along[1] * along[1];
+        let dot = along[0] * off[0] + along[1] * off[1];
+        [dot, cross(along, off)].map(|part| (part / square).abs())
+    }
 }
 
 impl Solid {
@@ -61,15 +72,30 @@ impl Solid {
         })
     }
 
-    /// Its scaled Jacobian: the least sine of its angles, of a triangle times 2/√3; 1 for a square and an equilateral
-    /// triangle, 0 or less where the Jacobian is not positive at a corner. `at` are coordinates of all nodes, m.
+    /// Its scaled Jacobian: the least sine of its angles and of those between lines of its coordinates at its other nodes,
+    /// of a triangle times 2/√3; 1 for a square and an equilateral triangle, 0 or less where the Jacobian is not positive
+    /// at a node. `at` are coordinates of all nodes, m.
     pub fn scaled_jacobian(&self, at: &[[f64; 2]]) -> f64 {
         let scale = if self.n_corners() == 3 {
             2.0 / 3.0_f64.sqrt()
         } else {
             1.0
         };
-        let sines = self.angles(at).map(f64::sin);
+        let places: Vec<[f64; 2]> = self.nodes().iter().map(|&node| at[node]).collect();
+        let beyond_corners = self.kind.places[self.n_corners()..].iter();
+        let beyond_corners = beyond_corners.map(|&place| {
+            let [xi, eta] = (self.kind.tangents)(place, &places);
+            // In a triangle the third side is a line of its coordinates too.
+            let third = if self.n_corners() == 3 {
+                f64::hypot(eta[0] - xi[0], eta[1] - xi[1])
+            } else {
+                0.0
+            };
+            let mut lengths = [f64::hypot(xi[0], xi[1]), f64::hypot(eta[0], eta[1]), third];
+            lengths.sort_by(f64::total_cmp);
+            cross(xi, eta) / (lengths[1] * lengths[2])
+        });
+        let sines = self.angles(at).map(f64::sin).chain(beyond_corners);
         scale * sines.fold(f64::INFINITY, f64::min)
     }
 

@@ -21,13 +21,15 @@ pub(super) struct Wish {
 }
 
 /// The parameters of a group, some of them held.
-struct Search<'m> {
-    model: &'m mut Model,
-    group: &'m Group,
+pub(super) struct Search<'m> {
+    pub(super) model: &'m mut Model,
+    pub(super) group: &'m Group,
     /// All parameters of the model; those of the group are put in.
-    all: Vec<f64>,
+    pub(super) all: Vec<f64>,
     /// The parameters that move, by place in the group.
-    moving: Vec<usize>,
+    pub(super) moving: Vec<usize>,
+    /// Differences of a slow test make do with one side.
+    pub(super) is_one_sided: bool,
 }
 
 impl Search<'_> {
@@ -45,7 +47,7 @@ impl Search<'_> {
 
     /// Derivatives of a test's residuals by one parameter.
     fn derivative(&mut self, test: usize, parameter: usize) -> Result<Option<Vec<f64>>, Error> {
-        let sides = if self.model.tests[test].is_slow() {
+        let sides = if self.is_one_sided && self.model.tests[test].is_slow() {
             Sides::One
         } else {
             Sides::Both
@@ -218,6 +220,7 @@ impl Fit<'_> {
             group: self.group,
             all: all.to_vec(),
             moving: moving.to_vec(),
+            is_one_sided: true,
         }
     }
 

@@ -170,7 +170,7 @@ impl Model {
     pub(super) fn rows(&self, test: usize, counted: &[f64]) -> Result<Computed<Rows>, Error> {
         self.stop.check("the calibration")?;
         let values = self.values(counted);
-        match self.tests[test].rows(&values, &self.scratch, &self.stop) {
+        match self.tests[test].rows(&values, &self.scratch) {
             Ok(rows) => Ok(Ok(rows)),
             Err(error) if is_of_the_values(&error) => Ok(Err(words(&error))),
             Err(error) => Err(error),
@@ -322,10 +322,13 @@ impl Test {
     }
 
     /// What the test computes with these values of the parameters.
-    fn rows(&self, values: &[f64], scratch: &Scratch, stop: &Stop) -> Result<Rows, Error> {
+    ///
+    /// # Errors
+    /// Those of the computation.
+    pub(super) fn rows(&self, values: &[f64], scratch: &Scratch) -> Result<Rows, Error> {
         match self.with(values)? {
             Subject::Driver(mut driver) => {
-                driver.point_mut().stop_on(stop);
+                driver.point_mut().stop_on(&scratch.stop);
                 rows_of(&driver)
             }
             Subject::Case(case) => Ok(measure(*case, scratch, Timing::Once)?.rows),
