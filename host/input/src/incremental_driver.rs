@@ -12,7 +12,7 @@ use crate::Error;
 use crate::driver::Driver;
 use crate::material::{ParameterTable, ParameterValue, build_law, find_law};
 use abi::Hypothesis;
-use law::foreign::{Adapter, Foreign};
+use law::foreign::Foreign;
 use law::{Opener, Pins, SearchPath};
 use lines::Lines;
 use point::{Control, Frame, N_MAX, Restrictions, Segment, Vector};
@@ -55,17 +55,8 @@ impl Driver {
     pub fn read_incremental(opener: &Opener, test: &Path, umat: &Path) -> Result<Self, Error> {
         let source = Source::read(test)?;
         let segments = segments(&source)?;
-        let foreign = Foreign {
-            adapter: Adapter::Umat,
-            library: std::path::absolute(umat).unwrap_or_else(|_| umat.to_owned()),
-            sidecar: None,
-            in_process: false,
-            record: None,
-            records_once: false,
-            externals: None,
-            scratch: None,
-            tangent_order: None,
-        };
+        let umat = std::path::absolute(umat).unwrap_or_else(|_| umat.to_owned());
+        let foreign = Foreign::umat(&umat);
         let library = opener.open_foreign(&foreign, |_| Ok(()))?;
         let id = library.laws().next().map(|law| law.id.clone());
         let id = Spanned::new(0..0, id.unwrap_or_default());
