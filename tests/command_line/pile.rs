@@ -171,7 +171,7 @@ fn head_and_weight_are_shaft_and_base() {
 fn forces_out_of_balance_are_told_as_a_share_of_the_largest_load() {
     let told = |solver: &str| {
         let place = Place::new();
-        place.write("pile.toml", &format!("{PILE}[solver]\n{solver}"));
+        place.write("pile.toml", format!("{PILE}[solver]\n{solver}"));
         let outcome = place.run(&["run", "pile.toml", "--out", "out"]);
         assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
         let said = format!("{}{}", outcome.stdout, outcome.stderr);
