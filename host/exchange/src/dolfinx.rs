@@ -12,7 +12,7 @@ pub(crate) fn files() -> Vec<(String, String)> {
     )]
 }
 
-/// What of the elements of a group its meshes do not have: they are of one kind, with straight sides.
+/// The first property of a group's elements that DOLFINx meshes here cannot have: other kinds, or curved sides.
 pub(crate) fn unknown(mesh: &Mesh, group: usize) -> Option<&'static str> {
     let n_nodes = mesh.solids.first().map_or(0, |solid| solid.nodes().len());
     let own = || mesh.solids.iter().filter(|solid| solid.group == group);
