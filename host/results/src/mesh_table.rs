@@ -54,7 +54,7 @@ impl MeshTable {
         let (n, where_) = (bad.len(), self.place(first));
         let elements = if n == 1 { "element is" } else { "elements are" };
         Some(format!(
-            "{n} {elements} degenerate: the Jacobian is not positive inside or at a node{}; the first is \
+            "{n} {elements} degenerate: the Jacobian is not positive{}; the first is \
              {where_}",
             if self.analysis == Analysis::Axisymmetric {
                 ", or they reach across the axis"

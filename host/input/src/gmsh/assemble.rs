@@ -103,6 +103,7 @@ pub(super) fn assemble(contents: &Contents<'_>, wanted: &Wanted<'_>) -> Result<A
         assembly.note_lines();
     }
     assembly.note_twins(&mesh);
+    assembly.note_bad_nodes(&mesh);
     let n_of_file = contents.nodes.len();
     let mut kept: Vec<usize> = number.into_keys().filter(|&n| n < n_of_file).collect();
     kept.sort_unstable();
@@ -539,6 +540,21 @@ impl<'a> Assembly<'a> {
         self.notes.push(format!(
             "{} where another one is, first at ({x}, {y}): elements are not joined there{upon} ({JOIN})",
             counted(twins.n, "node", " is", "s are")
+        ));
+    }
+
+    /// Says if a Jacobian is not positive at a node.
+    fn note_bad_nodes(&mut self, mesh: &Mesh) {
+        let solids = mesh.solids.iter().zip(&self.taken);
+        let mut bad = solids.filter(|(solid, _)| solid.scaled_jacobian(&mesh.nodes) <= 0.0);
+        let Some((_, (first, ..))) = bad.next() else {
+            return;
+        };
+        let first = self.contents.element(first);
+        let n = counted(1 + bad.count(), "element", " has", "s have");
+        self.notes.push(format!(
+            "{n} a Jacobian that is not positive at a node, the first is {first}: strains there are wrong; use smaller \
+             elements along curves"
         ));
     }
 }

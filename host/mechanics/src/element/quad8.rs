@@ -43,7 +43,6 @@ pub(super) const REFERENCE: Reference<8> = Reference {
     rule: quad_rule,
     exact: || quad_rule([3, 3]),
     exact_curved: || quad_rule([4, 4]),
-    places: &PLACES,
     sides: &EDGES_OF_QUAD,
     functions: Some(ProjectedOn {
         // Bilinear between the 2 × 2 points at ±1/√3.

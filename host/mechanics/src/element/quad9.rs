@@ -47,7 +47,6 @@ pub(super) const REFERENCE: Reference<9> = Reference {
     rule: quad_rule,
     exact: || quad_rule([3, 3]),
     exact_curved: || quad_rule([4, 4]),
-    places: &PLACES,
     sides: &EDGES_OF_QUAD,
     functions: None,
 };

@@ -17,8 +17,6 @@ pub(super) struct Reference<const N: usize> {
     pub(super) exact_curved: fn() -> Vec<RulePoint>,
     /// The rule with these numbers of points along ξ and η ([`Points::along`](super::kind::Points)).
     pub(super) rule: fn([usize; 2]) -> Vec<RulePoint>,
-    /// Places of its nodes.
-    pub(super) places: &'static [[f64; 2]],
     /// Corners and middle of every side.
     pub(super) sides: &'static [[usize; 3]],
     /// Functions that strains can be projected on.
@@ -49,13 +47,17 @@ impl<const N: usize> Reference<N> {
             .map(|by| [0, 1].map(|c| by.iter().zip(places).map(|(by, place)| by * place[c]).sum()))
     }
 
-    /// Whether the Jacobian of an element whose nodes lie here is positive at all nodes, and within curved sides: what is
-    /// asked of it with any integration.
+    /// Whether the Jacobian of an element whose nodes lie here is positive at the points of its finest rule. A mesh that one
+    /// integration can compute, another one can too.
     pub(super) fn is_regular(&self, places: &[[f64; 2]; N]) -> bool {
-        let inside = self.is_curved(places).then(self.exact_curved);
-        let inside = inside.iter().flatten().map(|point| point.at);
-        self.places.iter().copied().chain(inside).all(|at| {
-            let [xi, eta] = self.tangents(at, places);
+        let is_curved = self.is_curved(places);
+        let rule = if is_curved {
+            self.exact_curved
+        } else {
+            self.exact
+        };
+        rule().iter().all(|point| {
+            let [xi, eta] = self.tangents(point.at, places);
             xi[0] * eta[1] - xi[1] * eta[0] > 0.0
         })
     }

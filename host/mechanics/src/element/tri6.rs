@@ -51,7 +51,6 @@ pub(super) const REFERENCE: Reference<6> = Reference {
     rule: |[n, _]| triangle_rule(n),
     exact: || triangle_rule(6),
     exact_curved: collapsed_rule,
-    places: &PLACES,
     sides: &EDGES,
     functions: Some(ProjectedOn {
         // Linear between the points with area coordinates (2/3, 1/6, 1/6).
