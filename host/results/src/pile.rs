@@ -1,5 +1,6 @@
 //! A pile: the force in it, what holds it along its shaft and at its base, how it settles; `pile.csv`,
 //! its columns of `history.csv`, and its resistance.
+//! Loads are in kN here; in plane strain they are per metre, kN/m.
 //!
 //! Everything follows from the equilibrium of the pile's elements. The external force on them, node
 //! by node, upward positive, is

@@ -1,7 +1,8 @@
 //! What is wrong or odd about a pile, and where it is written.
 
-use super::{BAR, PILE, rows, run, value};
+use super::{BAR, PILE, rows, run, summary, value};
 use crate::program::{BAD_INPUT, DONE, Place};
+use serde_json::Value;
 use std::f64::consts::PI;
 
 /// Without normal stress, and without strength against tension, its sign in a last bit would decide where the bar holds.
@@ -246,4 +247,52 @@ fn what_is_odd_about_a_pile_is_said_before_it_is_loaded() {
             None => assert!(!outcome.says("[pile]:"), "{edit:?}: {}", outcome.stderr),
         }
     }
+}
+
+/// With a coarse tolerance and a method that does not undercut it; with a fine one nothing is printed.
+#[test]
+fn forces_out_of_balance_are_told_as_a_share_of_the_largest_load() {
+    let told = |solver: &str| {
+        let place = Place::new();
+        place.write("pile.toml", format!("{PILE}[solver]\n{solver}"));
+        let outcome = place.run(&["run", "pile.toml", "--out", "out"]);
+        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        let said = format!("{}{}", outcome.stdout, outcome.stderr);
+        let line = said
+            .lines()
+            .find(|line| line.contains("out of balance (phase"));
+        (place, line.map(str::to_owned))
+    };
+    let (_, fine) = told("force_tolerance = 1e-8\n");
+    assert_eq!(fine, None);
+    let (place, coarse) =
+        told("method = \"initial_stress\"\nforce_tolerance = 1e-2\ndisplacement_tolerance = 0.1\n");
+    let residual = |phase: &Value| phase["residual_force"].as_f64().unwrap();
+    let summary = summary(&place);
+    let phases = summary["phases"].as_array().unwrap();
+    let left = phases.iter().map(residual).fold(0.0, f64::max);
+    // 1 % of all forces, of which the weight of the ground is the largest part.
+    let weight = PI * 16.0 * 8.0 * 20.0;
+    assert!(left > 0.0 && left < 1e-2 * 2.0 * weight, "{left}");
+    let history = rows(&place.path("out/history.csv"));
+    let in_place = history
+        .iter()
+        .filter(|row| row["phase"] == "push" || row["phase"] == "pull");
+    let loads = in_place.flat_map(|row| {
+        ["head", "shaft", "base"].map(|part| value(row, &format!("pile_{part}_load_net")).abs())
+    });
+    let largest = loads.fold(0.0, f64::max);
+    let line = coarse.expect("a line about forces out of balance");
+    let share = format!(
+        "{:.1} % of its largest load, {largest:.1} kN",
+        100.0 * left / largest
+    );
+    assert!(
+        line.contains(&format!("{left:.2} kN")) && line.contains(&share),
+        "{line}, {share}"
+    );
+    let push = phases.iter().find(|phase| phase["name"] == "push");
+    let said = format!("phase `push`</dt><dd>{:.2} kN", residual(push.unwrap()));
+    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    assert!(report.contains(&said), "{said}");
 }

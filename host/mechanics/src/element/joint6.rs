@@ -185,10 +185,8 @@ impl Kinematics for Joint6 {
     }
 
     fn place_of(&self, point: usize) -> (usize, usize) {
-        (
-            point / self.points_per_element,
-            point % self.points_per_element,
-        )
+        let n = self.points_per_element;
+        (point / n, point % n)
     }
 
     fn n_components(&self) -> usize {

@@ -91,9 +91,8 @@ impl<const N: usize> Solid<N> {
             axes,
             points,
         } = elements;
-        let nodes = nodes.iter();
-        let nodes = nodes.map(|nodes| std::array::from_fn(|i| nodes[i]));
-        let nodes: Vec<[usize; N]> = nodes.collect();
+        let of_element = |nodes: &&[usize]| std::array::from_fn(|i| nodes[i]);
+        let nodes: Vec<[usize; N]> = nodes.iter().map(of_element).collect();
         let first = (!nodes.is_empty()).then(|| points(0));
         let points_per_element = first.map_or(0, |first| (reference.rule)(first.along).len());
         let strains = first.map(|first| first.strains);
@@ -291,10 +290,8 @@ impl<const N: usize> Kinematics for Solid<N> {
     }
 
     fn place_of(&self, point: usize) -> (usize, usize) {
-        (
-            point / self.points_per_element,
-            point % self.points_per_element,
-        )
+        let n = self.points_per_element;
+        (point / n, point % n)
     }
 
     fn n_components(&self) -> usize {

@@ -266,7 +266,7 @@ fn run_context(run: &Run, folder: &Path, is_running: bool) -> Template {
         ends => ends(run),
         mesh_error => run.summary.mesh_error.iter().flatten().map(OfPhase::words).collect::<Vec<_>>(),
         pictures => pictures(run),
-        resistances => run.summary.pile.as_ref().map(resistances).unwrap_or_default(),
+        resistances => resistances(&run.summary),
         groups => head.groups.iter().map(group).collect::<Vec<_>>(),
         laws => head.laws.iter().map(law).collect::<Vec<_>>(),
         solver => named_values(&head.solver),
@@ -390,8 +390,11 @@ fn load_in_words(
     format!("{load:.1} {unit}{split}{phase}")
 }
 
-/// Criteria of a pile's resistance: name, load or why none exists.
-fn resistances(pile: &Resistances) -> Vec<(String, String)> {
+/// Criteria of a pile's resistance: name, load or why none exists; and what the load test left out of balance.
+fn resistances(summary: &Summary) -> Vec<(String, String)> {
+    let Some(pile) = &summary.pile else {
+        return Vec::new();
+    };
     let of = pile
         .diameter
         .map_or_else(String::new, |diameter| format!(", D = {diameter:.4} m"));
@@ -450,7 +453,13 @@ fn resistances(pile: &Resistances) -> Vec<(String, String)> {
     let said = |(name, load, why): (String, Option<String>, &Option<String>)| {
         Some((name, load.or_else(|| why.clone())?))
     };
-    criteria.into_iter().filter_map(said).collect()
+    let mut tests = summary.phases.iter();
+    let test = tests.find(|phase| pile.phase.as_ref() == Some(&phase.name));
+    let left = test.and_then(|phase| {
+        let name = format!("largest force out of balance, phase `{}`", phase.name);
+        Some((name, format!("{:.2} {}", phase.residual_force?, pile.unit)))
+    });
+    criteria.into_iter().filter_map(said).chain(left).collect()
 }
 
 fn group(group: &Group) -> Template {
