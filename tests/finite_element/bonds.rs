@@ -104,11 +104,14 @@ fn single_corrections_are_told() {
     let finished = run(&text(&HARD[2]));
     let phases = &finished.summary()["phases"];
     assert!(phases[0]["single_corrections_from"].is_null());
+    // Without a look at bonds that open: 4 460 iterations, 25 cuts.
+    let iterations = phases[1]["iterations"].as_u64().unwrap();
+    assert!(iterations < 1500, "{iterations}");
     let from = phases[1]["single_corrections_from"]
         .as_u64()
         .expect("an increment");
     let warnings = &finished.observer.warnings;
-    let says = format!("phase `push`, increment {from}: no other way found an equilibrium");
+    let says = format!("phase `push`, increment {from}: steps found no equilibrium where bonds");
     assert!(warnings.iter().any(|w| w.contains(&says)), "{warnings:?}");
 }
 

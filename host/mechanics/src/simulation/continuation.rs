@@ -1,7 +1,8 @@
 //! Control of the steps of an increment. Under `control = "auto"` the load leads first. If ever shorter steps by the
 //! load fail, viscous control leads by short steps to the end of the increment; if it fails too, both lead by turns.
 //! The last resort, also under `control = "viscous"`, is viscous control by single corrections, if interfaces may
-//! break.
+//! break. They also begin where bonds opened in several failed steps of an increment; if they then fail, what they took
+//! the place of goes on.
 
 use crate::equilibrium::{Reason, Singularity, StepFailure};
 use crate::settings::{Control, Settings};
@@ -11,6 +12,9 @@ use crate::settings::{Control, Settings};
 /// increments of viscous control, carried 58 % more than under load control. The excess fell with
 /// the length of the steps.
 const PATIENCE: usize = 5;
+/// Steps of an increment that may fail where a bond opens. Shorter steps fail too: the bond breaks at the end of the
+/// longest step that finds equilibrium.
+const OPENINGS: usize = 3;
 /// Longest step under viscous control, as a fraction of an increment.
 pub(super) const LONGEST: f64 = 0.125;
 
@@ -30,6 +34,11 @@ pub(super) struct Lead {
     was_in_vain: bool,
     /// Steps that failed in a row.
     failures: usize,
+    /// Steps that failed where a bond opened.
+    openings: usize,
+    /// Where single corrections began because bonds opened: the control and the step, as a load factor, that they took
+    /// the place of.
+    instead_of: Option<(Control, f64)>,
     /// Viscous control goes by single corrections.
     pub(super) singly: bool,
     /// How often that may be begun with.
@@ -48,6 +57,8 @@ impl Lead {
             may_be_viscous,
             was_in_vain: false,
             failures: 0,
+            openings: 0,
+            instead_of: None,
             singly: false,
             beginnings: if may_be_viscous || is_viscous {
                 BEGINNINGS
@@ -83,6 +94,30 @@ impl Lead {
     /// Whether enough steps have failed in a row, this one included, to turn from the load to another way.
     pub(super) fn has_waited(&self) -> bool {
         !self.singly && self.failures + 1 >= PATIENCE
+    }
+
+    /// Whether enough steps of the increment, this one included, have failed where a bond opens.
+    pub(super) fn opens_bonds(&mut self, failure: &StepFailure) -> bool {
+        self.openings += usize::from(failure.opens_bond);
+        failure.opens_bond && !self.singly && self.openings == OPENINGS
+    }
+
+    /// Turns to single corrections where bonds open, instead of a step of this length. Returns the length of the first
+    /// one.
+    pub(super) fn begins_early(&mut self, step: f64, shortest: f64, n: f64) -> Option<f64> {
+        if self.beginnings == 0 {
+            return None;
+        }
+        self.instead_of = Some((self.control, step));
+        (self.singly, self.control) = (true, Control::Viscous);
+        Some(shortest.min(LONGEST / n))
+    }
+
+    /// Turns back from single corrections that began early to what they took the place of, with a step of its length.
+    pub(super) fn turns_back(&mut self) -> Option<f64> {
+        let (control, step) = self.instead_of.take()?;
+        (self.singly, self.control) = (false, control);
+        Some(step)
     }
 
     /// Whether single corrections end with a next step of this fraction of an increment: they may not be begun with

@@ -55,6 +55,8 @@ enum Then {
     Viscous,
     /// Viscous control by single corrections, from here on, with a first step of this length.
     Singly(f64),
+    /// What single corrections took the place of, with a step of this length.
+    Back(f64),
     /// Nothing.
     End,
 }
@@ -162,6 +164,10 @@ impl Simulation {
                 way.was_cut = true;
                 Ok(())
             }
+            Then::Back(step) => {
+                phase.course.step = step;
+                Ok(())
+            }
             Then::End => Err(self.cannot_go_on(phase, place, start, failure)),
             Then::Path => {
                 let goal = [way.n as f64, way.target.min(phase.course.loads.leg[1])];
@@ -198,12 +204,20 @@ impl Simulation {
     /// What follows a step that failed, the next one being that of the phase's course.
     fn after(&self, failure: &StepFailure, way: &mut Way<'_>, phase: &UnderWay) -> Then {
         let (step, n) = (phase.course.step, way.n as f64);
+        if let Some(step) = way.lead.turns_back() {
+            return Then::Back(step);
+        }
+        if way.lead.opens_bonds(failure)
+            && let Some(step) = way.lead.begins_early(step, way.smallest, n)
+        {
+            return Then::Singly(step);
+        }
         let follows = self.settings().control == Control::ArcLength
             && phase.course.history.latest().is_some();
         let is_small = step < way.smallest.max(PATIENCE / n);
         let is_out = step < way.smallest;
         let stays = way.lead.stays(is_out, step * n);
-        // Where it has led before, nothing else is tried first.
+        // Where single corrections have led before, nothing else is tried first.
         let again = phase.record.singly_from.is_some() && way.lead.has_waited();
         let turns = !stays && !again && way.lead.turns(failure, is_out);
         let is_over = is_out && !stays && !(turns && way.lead.is_viscous());

@@ -163,8 +163,8 @@ const TURNED_VISCOUS: &str = "even short load steps found no equilibrium; the re
                               viscous control";
 
 /// Single corrections are tried.
-const SINGLY: &str = "no other way found an equilibrium; viscous control goes on by single corrections, and bonds that \
-                      break stay broken. Which bonds break can depend on the step size: compare with a run with more \
+const SINGLY: &str = "steps found no equilibrium where bonds may break; viscous control goes on by single corrections, \
+                      and bonds that break stay broken. Which bonds break can depend on the step size: compare with a run with more \
                       increments";
 
 /// Advice after viscous control.

@@ -221,6 +221,8 @@ pub struct StepFailure {
     pub culprit: Option<Culprit>,
     /// What gives way, if that could be found out.
     pub mechanism: Option<Mechanism>,
+    /// A point of an interface with a bond opens in the last iterate.
+    pub opens_bond: bool,
 }
 
 impl From<Reason> for StepFailure {
@@ -231,6 +233,7 @@ impl From<Reason> for StepFailure {
             runaway: None,
             culprit: None,
             mechanism: None,
+            opens_bond: false,
         }
     }
 }

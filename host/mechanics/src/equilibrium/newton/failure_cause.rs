@@ -53,6 +53,7 @@ impl Newton<'_> {
         let (culprit, before) = self.diagnose(control, state, task).unwrap_or_default();
         self.reference.runaway = runaway;
         StepFailure {
+            opens_bond: self.opens_bond(),
             culprit,
             mechanism: self.mechanism(&state.balance.residual, &before, task.period.0),
             ..Reason::Unmet(Iterations::Newton(n, in_vain), unmet).into()
@@ -82,6 +83,12 @@ impl Newton<'_> {
             .ok()?;
         let culprit = diagnosis::compare(self.groups, &before, task.period);
         Some((culprit, jumps))
+    }
+
+    /// Whether a bond has opened in an iterate of the step. It may be closed in the last one.
+    fn opens_bond(&self) -> bool {
+        let mut opened = self.reference.opened.iter();
+        opened.any(|&number| self.groups[number].may_break())
     }
 
     /// Jumps of the trial state, of the interfaces that may break.

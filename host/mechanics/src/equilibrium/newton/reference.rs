@@ -13,6 +13,7 @@ use crate::assembly::norms;
 use crate::group::Group;
 use algebra::{LinearSolver, Singular};
 use law::Operator;
+use std::collections::BTreeSet;
 
 /// Most bytes of a factorisation that is kept besides that of the iterations.
 const MOST_BESIDE: u64 = 1 << 28;
@@ -26,6 +27,8 @@ pub(in crate::equilibrium) struct Reference {
     pub(super) changes: Vec<Change>,
     /// What ran away in the last evaluation.
     pub(super) runaway: Option<Runaway>,
+    /// Numbers of interfaces of which a point opened in an iterate.
+    pub(super) opened: BTreeSet<usize>,
     /// Sizes of the displacement increments that the iterations start from; empty before.
     predicted: Vec<f64>,
     /// They come from the tangent at the start, which may have next to no stiffness.

@@ -86,6 +86,7 @@ impl Newton<'_> {
             (internal, unreliable) = self.internal_forces(increment, task, operator)?;
         }
         self.kept.tangents = operator;
+        self.note_opened();
         if let Some(domain) = self.equations.domain {
             let boundary = &self.equations.places.boundary;
             let moved: Vec<f64> = boundary.iter().map(|&place| increment[place]).collect();
@@ -114,6 +115,18 @@ impl Newton<'_> {
             away,
             unreliable,
         })
+    }
+
+    /// Takes note of the interfaces of which a point opens in the trial state.
+    fn note_opened(&mut self) {
+        let opened = self
+            .groups
+            .iter()
+            .enumerate()
+            .filter(|(_, group)| group.opens());
+        self.reference
+            .opened
+            .extend(opened.map(|(number, _)| number));
     }
 
     /// Trial state and internal forces by place, without those of the domain, under displacement

@@ -31,6 +31,23 @@ impl Group {
             && (0..self.kinematics.n_points()).any(is_bonded)
     }
 
+    /// Whether it is an interface of which a point that carried traction at the start of the step carries none in the trial
+    /// state.
+    pub fn opens(&self) -> bool {
+        let (n, place) = (self.law.built.law.n_components(), self.flux_place());
+        if n != 2 || self.is_linear() {
+            return false;
+        }
+        let carries = |stress: &[f64], point| {
+            let traction = place.of_point(stress, point, n);
+            traction.iter().any(|t| t.abs() > 0.0)
+        };
+        let [before, after] = [&self.stress.committed, &self.stress.trial];
+        !after.is_empty()
+            && (0..self.kinematics.n_points())
+                .any(|point| carries(before, point) && !carries(after, point))
+    }
+
     /// Jumps of the trial state, of all points.
     pub fn trial_jumps(&self) -> Vec<f64> {
         self.gradient().trial.clone()
