@@ -3,6 +3,7 @@
 //!
 //! Compression is positive here.
 
+use crate::rate::Rate;
 use crate::soil::Soil;
 use crate::system::{Iterate, Rates, System};
 use std::mem;
@@ -116,10 +117,10 @@ impl Soil {
 
     /// Rate of [`size`](Self::size).
     #[inline]
-    pub(crate) fn size_rate(&self, s: &[f64; 3], rate: &[f64; 3]) -> f64 {
+    pub(crate) fn size_rate<const N: usize>(&self, s: &[f64; 3], rate: &[Rate<N>; 3]) -> Rate<N> {
         let (major, minor) = (s[0].abs(), s[2].abs());
         if major.max(minor) < self.c_cos_phi {
-            0.0
+            Rate::ZERO
         } else if major >= minor {
             rate[0] * s[0].signum()
         } else {
@@ -383,10 +384,10 @@ impl Soil {
     pub(crate) fn system<'a>(
         &'a self,
         trial: &'a Trial,
-        end: &End,
-    ) -> Option<(System<'a>, Iterate)> {
+        end: &'a End,
+    ) -> Option<(System<'a>, &'a Iterate)> {
+        let iterate = end.iterate.as_ref()?;
         let hardening = self.cap.hardening(self, trial.p_p);
-        let iterate = end.iterate?;
         Some((System::new(self, trial, end.zone, hardening), iterate))
     }
 }
@@ -394,15 +395,18 @@ impl Soil {
 impl End {
     /// Rates of an end, from the rates of what it depends on; those of p_p and γ_ps if they are asked for.
     #[inline]
-    pub(crate) fn rates(
+    pub(crate) fn rates<const N: usize>(
         &self,
-        system: Option<&(System<'_>, Iterate)>,
-        of: &Rates,
+        system: Option<&(System<'_>, &Iterate)>,
+        of: &Rates<N>,
         with_variables: bool,
-    ) -> Rates {
+    ) -> Rates<N> {
         match system {
             Some((system, iterate)) => system.rates(iterate, of, with_variables),
-            None if self.zone.corner => Rates { s: [0.0; 3], ..*of },
+            None if self.zone.corner => Rates {
+                s: [Rate::ZERO; 3],
+                ..*of
+            },
             None => *of,
         }
     }

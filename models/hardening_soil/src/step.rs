@@ -3,6 +3,7 @@
 //!
 //! Compression is positive here.
 
+use crate::rate::{Linear, Rate, mean};
 use crate::return_mapping::{End, Trial};
 use crate::soil::Soil;
 use crate::spectral::Principal;
@@ -26,32 +27,28 @@ const MAX_HALVINGS: u32 = 10;
 /// Steps, whole ones and halves, in an increment.
 const MAX_ATTEMPTS: u32 = 400;
 
-/// Stress and internal variables on their way through an increment.
+/// Stress and internal variables on their way through an increment, or their rates.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Point<const N: usize> {
-    pub(crate) stress: [f64; N],
-    pub(crate) p_p: f64,
-    pub(crate) gamma: f64,
+pub(crate) struct Point<const N: usize, T = f64> {
+    pub(crate) stress: [T; N],
+    pub(crate) p_p: T,
+    pub(crate) gamma: T,
 }
 
-/// Derivatives of a point by the strain increment, a column for each component.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Derivative<const N: usize> {
-    columns: [Point<N>; N],
-}
+/// Derivatives of a point by the strain increment.
+pub(crate) type Derivative<const N: usize> = Point<N, Rate<N>>;
 
 impl<const N: usize> Derivative<N> {
     const ZERO: Self = Self {
-        columns: [Point {
-            stress: [0.0; N],
-            p_p: 0.0,
-            gamma: 0.0,
-        }; N],
+        stress: [Rate::ZERO; N],
+        p_p: Rate::ZERO,
+        gamma: Rate::ZERO,
     };
 
     /// ∂stress/∂strain, row by row.
+    #[inline]
     pub(crate) fn tangent(&self) -> [[f64; N]; N] {
-        array::from_fn(|i| array::from_fn(|j| self.columns[j].stress[i]))
+        self.stress.map(|rate| rate.0)
     }
 }
 
@@ -66,14 +63,16 @@ impl<const N: usize> Point<N> {
             Err(Failure::Numeric("the stress overflows"))
         }
     }
+}
 
+impl<const N: usize, T: Linear> Point<N, T> {
     /// This point and `other`, by their weights.
     #[inline]
     fn sum(&self, own: f64, factor: f64, other: &Self) -> Self {
         Self {
-            stress: array::from_fn(|i| own * self.stress[i] + factor * other.stress[i]),
-            p_p: own * self.p_p + factor * other.p_p,
-            gamma: own * self.gamma + factor * other.gamma,
+            stress: array::from_fn(|i| self.stress[i] * own + other.stress[i] * factor),
+            p_p: self.p_p * own + other.p_p * factor,
+            gamma: self.gamma * own + other.gamma * factor,
         }
     }
 }
@@ -84,10 +83,10 @@ pub(crate) struct Increment<const N: usize> {
     pub(crate) strain: [f64; N],
     /// Young's modulus over that of unloading, and its derivative by the strain.
     pub(crate) stiffening: f64,
-    pub(crate) stiffening_slope: [f64; N],
+    pub(crate) stiffening_slope: Rate<N>,
     /// What γ_ps grows by over the plastic shear strain, and its derivative.
     pub(crate) slowing: f64,
-    pub(crate) slowing_slope: [f64; N],
+    pub(crate) slowing_slope: Rate<N>,
 }
 
 impl<const N: usize> Increment<N> {
@@ -97,9 +96,9 @@ impl<const N: usize> Increment<N> {
         Self {
             strain,
             stiffening: 1.0,
-            stiffening_slope: [0.0; N],
+            stiffening_slope: Rate::ZERO,
             slowing: 1.0,
-            slowing_slope: [0.0; N],
+            slowing_slope: Rate::ZERO,
         }
     }
 }
@@ -232,7 +231,7 @@ impl Soil {
         step: &Step<N>,
         from: &Derivative<N>,
         part: &Part<'_, N>,
-    ) -> (Derivative<N>, [f64; N]) {
+    ) -> (Derivative<N>, Rate<N>) {
         let [(axes_1, trial_1, end_1), (axes_2, trial_2, end_2)] = &step.passes;
         let Increment {
             stiffening,
@@ -260,59 +259,51 @@ impl Soil {
         };
         let (start, turn_1, turn_2) = (step.start.turn(), axes_1.turn(), axes_2.turn());
         let (system_1, system_2) = (self.system(trial_1, end_1), self.system(trial_2, end_2));
-        let kappa: [f64; N] = array::from_fn(|i| {
-            if i < 3 {
-                1.0
-            } else {
-                end_2.kappa(self, trial_2, axes_2.pair(i))
-            }
-        });
         // Nothing follows a whole increment.
         let is_last = part.fraction >= 1.0;
-        let mut error = [0.0; N];
-        let columns = array::from_fn(|j| {
-            let column = &from.columns[j];
-            let d_s_0 = if part.is_first {
-                [0.0; 3]
-            } else {
-                start.normal(&column.stress)
-            };
-            let d_x_0 = x_0_by_gamma * column.gamma + x_0_by_minor * d_s_0[2];
-            let mut of = Rates {
-                start: d_s_0,
-                p_p: column.p_p,
-                gamma: column.gamma,
-                slowing: part.increment.slowing_slope[j],
-                ..Rates::default()
-            };
-            let mut strain = [0.0; N];
-            strain[j] = part.fraction;
-            let d_unit = self.unit_stress(&strain);
-            let trial = |E: f64, d_E: f64| -> [f64; N] {
-                array::from_fn(|i| column.stress[i] + E * d_unit[i] + d_E * unit[i])
-            };
-            of.E = stiffening * E_0_slope * d_s_0[2] + stiffening_slope[j] * E_0;
-            of.s = turn_1.normal(&trial(trial_1.E, of.E));
-            of.sin_psi = (at_0[1] + at_0[2]) * d_x_0;
-            let d_s_1 = end_1.rates(system_1.as_ref(), &of, false).s;
-            let d_middle = 0.5 * (d_s_0[2] + d_s_1[2]);
-            of.E = stiffening * E_slope * d_middle + stiffening_slope[j] * E;
-            let moved = turn_2.stress(&trial(trial_2.E, of.E));
-            of.s = [moved[0], moved[1], moved[2]];
-            let d_x_1 = x_1_by_q * (d_s_1[0] - d_s_1[2]) + x_1_by_minor * d_s_1[2];
-            of.sin_psi = over[1] * d_x_0 + over[2] * d_x_1;
-            let end = end_2.rates(system_2.as_ref(), &of, !is_last);
-            let d_size = by_size * self.size_rate(&s_0, &d_s_0);
-            error[j] = (sign * (end.s[worst] - d_s_1[worst]) - d_size) / step.size;
-            let kept: [f64; N] =
-                array::from_fn(|i| if i < 3 { end.s[i] } else { kappa[i] * moved[i] });
-            Point {
-                stress: turn_2.back(&kept),
-                p_p: end.p_p,
-                gamma: end.gamma,
-            }
-        });
-        (Derivative { columns }, error)
+        let d_s_0 = if part.is_first {
+            [Rate::ZERO; 3]
+        } else {
+            start.normal(&from.stress)
+        };
+        let d_x_0 = from.gamma * x_0_by_gamma + d_s_0[2] * x_0_by_minor;
+        let trial = |E: f64, d_E: Rate<N>| -> [Rate<N>; N] {
+            array::from_fn(|i| {
+                let mut strain = [0.0; N];
+                strain[i] = part.fraction * E;
+                from.stress[i] + Rate(self.unit_stress(&strain)) + d_E * unit[i]
+            })
+        };
+        let mut of = Rates {
+            s: d_s_0,
+            start: d_s_0,
+            E: d_s_0[2] * (stiffening * E_0_slope) + *stiffening_slope * E_0,
+            sin_psi: d_x_0 * (at_0[1] + at_0[2]),
+            p_p: from.p_p,
+            gamma: from.gamma,
+            slowing: part.increment.slowing_slope,
+        };
+        of.s = turn_1.normal(&trial(trial_1.E, of.E));
+        let d_s_1 = end_1.rates(system_1.as_ref(), &of, false).s;
+        let d_middle = (d_s_0[2] + d_s_1[2]) * 0.5;
+        of.E = d_middle * (stiffening * E_slope) + *stiffening_slope * E;
+        let mut moved = turn_2.stress(&trial(trial_2.E, of.E));
+        of.s = [moved[0], moved[1], moved[2]];
+        let d_x_1 = (d_s_1[0] - d_s_1[2]) * x_1_by_q + d_s_1[2] * x_1_by_minor;
+        of.sin_psi = d_x_0 * over[1] + d_x_1 * over[2];
+        let end = end_2.rates(system_2.as_ref(), &of, !is_last);
+        let d_size = self.size_rate(&s_0, &d_s_0) * by_size;
+        let error = ((end.s[worst] - d_s_1[worst]) * sign - d_size) * (1.0 / step.size);
+        moved[..3].copy_from_slice(&end.s);
+        for (i, rate) in moved.iter_mut().enumerate().skip(3) {
+            *rate = *rate * end_2.kappa(self, trial_2, axes_2.pair(i));
+        }
+        let derivative = Derivative {
+            stress: turn_2.back(&moved),
+            p_p: end.p_p,
+            gamma: end.gamma,
+        };
+        (derivative, error)
     }
 
     /// Carries a point over an increment.
@@ -364,7 +355,7 @@ impl Soil {
             let (derivative, error) = if part.with_derivative {
                 self.differentiate(step, &from.1, part)
             } else {
-                (Derivative::ZERO, [0.0; N])
+                (Derivative::ZERO, Rate::ZERO)
             };
             (step.end, derivative, excess(step), error)
         });
@@ -390,11 +381,12 @@ impl Soil {
         let mut mean = (end.sum(1.0 - weight, weight, &halves.0), Derivative::ZERO);
         if part.with_derivative {
             let change = halves.0.sum(1.0, -1.0, &end);
-            mean.1.columns = array::from_fn(|j| {
-                derivative.columns[j]
-                    .sum(1.0 - weight, weight, &halves.1.columns[j])
-                    .sum(1.0, slope * error[j], &change)
-            });
+            let rate = derivative.sum(1.0 - weight, weight, &halves.1);
+            mean.1 = Derivative {
+                stress: array::from_fn(|i| rate.stress[i] + error * (slope * change.stress[i])),
+                p_p: rate.p_p + error * (slope * change.p_p),
+                gamma: rate.gamma + error * (slope * change.gamma),
+            };
         }
         self.harden(&mut mean.0, &mut mean.1);
         Some(mean)
@@ -405,25 +397,18 @@ impl Soil {
     fn harden<const N: usize>(&self, point: &mut Point<N>, derivative: &mut Derivative<N>) {
         let principal = Principal::of(&point.stress);
         let s = principal.values;
-        let turn = principal.turn();
+        let rate = principal.turn().normal(&derivative.stress);
         let [shear, _, cap, _] = self.excess(&s, point.p_p, point.gamma);
         if shear > 0.0 {
             let (gamma, by_q, by_minor) = self.gamma(s[0] - s[2], s[2]);
             point.gamma = gamma;
-            for column in &mut derivative.columns {
-                let rate = turn.normal(&column.stress);
-                column.gamma = by_q * (rate[0] - rate[2]) + by_minor * rate[2];
-            }
+            derivative.gamma = (rate[0] - rate[2]) * by_q + rate[2] * by_minor;
         }
         if cap > 0.0 {
             let (q, p) = (self.cap.q(&s), ((s[0] + s[1] + s[2]) / 3.0).max(0.0));
             point.p_p = self.cap.size(q, p);
             let by_q = q / (self.cap.M * self.cap.M * point.p_p);
-            for column in &mut derivative.columns {
-                let rate = turn.normal(&column.stress);
-                let mean = (rate[0] + rate[1] + rate[2]) / 3.0;
-                column.p_p = by_q * self.cap.q(&rate) + p / point.p_p * mean;
-            }
+            derivative.p_p = self.cap.q(&rate) * by_q + mean(&rate) * (p / point.p_p);
         }
     }
 }

@@ -4,26 +4,10 @@
 //! Compression is positive here; Λ is the multiplier of shear, μ that of the cap.
 
 use crate::cap::Hardening;
+use crate::rate::{Linear, Rate, dot, mean, plus};
 use crate::return_mapping::{Merged, Shear, Trial, Zone};
 use crate::soil::Soil;
 use std::array;
-
-/// Σ xᵢ yᵢ.
-#[inline]
-pub(crate) fn dot(x: &[f64; 3], y: &[f64; 3]) -> f64 {
-    x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
-}
-
-/// x + factor y.
-#[inline]
-fn plus(x: &[f64; 3], factor: f64, y: &[f64; 3]) -> [f64; 3] {
-    array::from_fn(|i| x[i] + factor * y[i])
-}
-
-#[inline]
-fn mean(x: &[f64; 3]) -> f64 {
-    (x[0] + x[1] + x[2]) / 3.0
-}
 
 /// Stress, multipliers and the derivatives of the conditions at one iterate.
 #[derive(Clone, Copy, Debug)]
@@ -51,19 +35,19 @@ pub(crate) struct Iterate {
 }
 
 /// Rates of what a return depends on, and of its results.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Rates {
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rates<const N: usize> {
     /// Principal stresses: of the trial stress, then of the end.
-    pub(crate) s: [f64; 3],
+    pub(crate) s: [Rate<N>; 3],
     /// Principal stresses at the start.
-    pub(crate) start: [f64; 3],
+    pub(crate) start: [Rate<N>; 3],
     /// Young's modulus, kPa.
-    pub(crate) E: f64,
+    pub(crate) E: Rate<N>,
     /// sin ψ_m.
-    pub(crate) sin_psi: f64,
-    pub(crate) p_p: f64,
-    pub(crate) gamma: f64,
-    pub(crate) slowing: f64,
+    pub(crate) sin_psi: Rate<N>,
+    pub(crate) p_p: Rate<N>,
+    pub(crate) gamma: Rate<N>,
+    pub(crate) slowing: Rate<N>,
 }
 
 /// A return to known surfaces.
@@ -173,34 +157,35 @@ impl<'a> System<'a> {
 
     /// Difference of plastic strains that makes stresses equal.
     #[inline]
-    fn apart(&self, difference: f64) -> f64 {
-        difference / (2.0 * self.soil.G * self.trial.E)
+    fn apart<T: Linear>(&self, difference: T) -> T {
+        difference * (0.5 / (self.soil.G * self.trial.E))
     }
 
     /// The mean of merged stresses, and what the cut-off makes of them, Eq. (16).
     #[inline]
-    fn condensed(&self, s: &[f64; 3], R_t: f64) -> [f64; 3] {
+    fn condensed<T: Linear>(&self, s: &[T; 3], R_t: T) -> [T; 3] {
         let nu = self.soil.nu;
         let [mut s1, mut s2, mut s3] = *s;
         match self.zone.merged {
             Merged::None => {}
             Merged::First12 => {
-                s1 = 0.5 * (s1 + s2);
+                s1 = (s1 + s2) * 0.5;
                 s2 = s1;
             }
             Merged::Last23 => {
-                s2 = 0.5 * (s2 + s3);
+                s2 = (s2 + s3) * 0.5;
                 s3 = s2;
             }
         }
         if !self.zone.tension {
             return [s1, s2, s3];
         }
+        let least = R_t * -1.0;
         if self.zone.merged == Merged::Last23 {
-            return [s1 - 2.0 * nu * (s3 + R_t), -R_t, -R_t];
+            return [s1 - (s3 + R_t) * (2.0 * nu), least, least];
         }
-        let change = nu / (1.0 - nu) * (s3 + R_t);
-        [s1 - change, s2 - change, -R_t]
+        let change = (s3 + R_t) * (nu / (1.0 - nu));
+        [s1 - change, s2 - change, least]
     }
 
     /// Stress of a strain; at the cut-off the stress that it does not take away, Eq. (16).
@@ -234,9 +219,9 @@ impl<'a> System<'a> {
 
     /// The change of stress that follows a direct change.
     #[inline]
-    fn respond(&self, direct: &[f64; 3], [[pp, pq], [qp, qq]]: &[[f64; 2]; 2]) -> [f64; 3] {
+    fn respond<T: Linear>(&self, direct: &[T; 3], response: &[[f64; 2]; 2]) -> [T; 3] {
         let (p, q) = (mean(direct), dot(&self.a, direct));
-        let (p, q) = (pp * p + pq * q, qp * p + qq * q);
+        let [p, q] = response.map(|[by_p, by_q]| p * by_p + q * by_q);
         array::from_fn(|i| direct[i] - p * self.by_p[i] - q * self.by_q[i])
     }
 
@@ -387,79 +372,65 @@ impl<'a> System<'a> {
         gap <= 2.0 * self.soil.G * self.trial.E * closing
     }
 
-    /// Rates of stress, p_p and γ_ps at the end; E, sin ψ_m and `start` of the result are unused.
+    /// Rates of stress, p_p and γ_ps at the end; the others of the result are those of the start.
     #[inline]
-    pub(crate) fn rates(&self, end: &Iterate, of: &Rates, with_variables: bool) -> Rates {
+    pub(crate) fn rates<const N: usize>(
+        &self,
+        end: &Iterate,
+        of: &Rates<N>,
+        with_variables: bool,
+    ) -> Rates<N> {
         let [Lambda, mu] = end.multipliers;
         let theta = self.trial.theta;
         let old = 1.0 - theta;
-        let mut direct = self.condensed(&of.s, 0.0);
-        let by_E = of.E / self.trial.E;
-        direct = plus(&direct, -Lambda * by_E, &self.by_shear);
-        let u = if self.zone.shear == Shear::Hardening {
-            of.sin_psi
-        } else {
-            0.0
-        };
-        if u != 0.0 {
-            let zero = self.flow(0.0);
-            let turn: [f64; 3] = array::from_fn(|i| self.flow(1.0)[i] - zero[i]);
-            direct = plus(&direct, -Lambda * u, &self.elastic(&turn));
+        let by_E = of.E * (1.0 / self.trial.E);
+        let mut direct = self.condensed(&of.s, Rate::ZERO);
+        direct = plus(&direct, by_E * -Lambda, &self.by_shear);
+        let mut u = Rate::ZERO;
+        if self.zone.shear == Shear::Hardening {
+            u = of.sin_psi;
+            let (zero, one) = (self.flow(0.0), self.flow(1.0));
+            let turned = self.elastic(&array::from_fn(|i| one[i] - zero[i]));
+            direct = plus(&direct, u * -Lambda, &turned);
         }
         let (p_0, q_0) = (mean(&of.start), self.soil.cap.q(&of.start));
         if self.zone.cap {
-            direct = plus(
-                &direct,
-                -mu * (by_E * end.middle[0] + old * p_0),
-                &self.by_p,
-            );
-            direct = plus(
-                &direct,
-                -mu * (by_E * end.middle[1] + old * q_0),
-                &self.by_q,
-            );
+            let [p, q] = end.middle.map(|x| by_E * (-mu * x));
+            direct = plus(&direct, p - p_0 * (mu * old), &self.by_p);
+            direct = plus(&direct, q - q_0 * (mu * old), &self.by_q);
         }
         let fixed = self.respond(&direct, &end.response);
         let [growth, weight, by_u, by_apart] = self.growth(Lambda);
         let difference = self.trial.s[0] - self.trial.s[1];
         let apart = self.apart(of.s[0] - of.s[1] - by_E * difference);
-        let gamma =
-            of.gamma + by_u * u + by_apart * apart + growth / self.trial.slowing * of.slowing;
-        let mut change = [0.0; 2];
+        let slowed = of.slowing * (growth / self.trial.slowing);
+        let gamma = of.gamma + u * by_u + apart * by_apart + slowed;
+        let mut change = [Rate::ZERO; 2];
         if self.zone.shear != Shear::None {
-            change[0] = dot(&end.gradient[0], &fixed) + end.by_gamma * gamma;
+            change[0] = dot(&end.gradient[0], &fixed) + gamma * end.by_gamma;
         }
         if self.zone.cap {
-            change[1] = dot(&end.gradient[1], &fixed)
-                - end.by_start * of.p_p
-                - end.by_strain * 2.0 * mu * old * p_0;
+            let volume = p_0 * (end.by_strain * 2.0 * mu * old);
+            change[1] = dot(&end.gradient[1], &fixed) - of.p_p * end.by_start - volume;
         }
         let [d_Lambda, d_mu] = end.correction(&change);
-        let s = plus(
-            &plus(&fixed, d_Lambda, &end.by_multiplier[0]),
-            d_mu,
-            &end.by_multiplier[1],
-        );
-        let mut rates = Rates {
-            s,
-            p_p: of.p_p,
-            gamma: of.gamma,
-            ..Rates::default()
-        };
+        let [by_Lambda, by_mu] = &end.by_multiplier;
+        let s = plus(&plus(&fixed, d_Lambda, by_Lambda), d_mu, by_mu);
+        let mut rates = Rates { s, ..*of };
         if !with_variables {
             return rates;
         }
         if self.zone.cap {
-            let volume = d_mu * end.middle[0] + mu * (theta * mean(&s) + old * p_0);
-            rates.p_p = end.by_start * of.p_p + end.by_strain * 2.0 * volume;
+            let volume = d_mu * end.middle[0] + (mean(&s) * theta + p_0 * old) * mu;
+            rates.p_p = of.p_p * end.by_start + volume * (2.0 * end.by_strain);
         }
         match self.zone.shear {
             Shear::None => {}
-            Shear::Hardening => rates.gamma = gamma + weight * d_Lambda,
+            Shear::Hardening => rates.gamma = gamma + d_Lambda * weight,
             Shear::Limit => {
                 let (reached, by_q, by_minor) = self.soil.gamma(end.s[0] - end.s[2], end.s[2]);
                 if reached > self.trial.gamma {
-                    rates.gamma = by_q * (s[0] - s[2]) + by_minor * s[2];
+                    rates.gamma = (s[0] - s[2]) * by_q + s[2] * by_minor;
                 }
             }
         }
@@ -470,9 +441,12 @@ impl<'a> System<'a> {
 impl Iterate {
     /// −J⁻¹ x.
     #[inline]
-    pub(crate) fn correction(&self, x: &[f64; 2]) -> [f64; 2] {
+    pub(crate) fn correction<T: Linear>(&self, x: &[T; 2]) -> [T; 2] {
         let [[a, b], [c, d]] = self.jacobian;
         let scale = -1.0 / (a * d - b * c);
-        [(d * x[0] - b * x[1]) * scale, (a * x[1] - c * x[0]) * scale]
+        [
+            x[0] * (d * scale) - x[1] * (b * scale),
+            x[1] * (a * scale) - x[0] * (c * scale),
+        ]
     }
 }
