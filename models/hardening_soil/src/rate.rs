@@ -69,3 +69,9 @@ pub(crate) fn mean<T: Linear>(x: &[T; 3]) -> T {
 pub(crate) fn plus<T: Linear>(x: &[T; 3], factor: T, y: &[f64; 3]) -> [T; 3] {
     array::from_fn(|i| x[i] + factor * y[i])
 }
+
+/// Rows of a matrix times a vector.
+#[inline]
+pub(crate) fn times<T: Linear>(rows: &[[f64; 2]; 2], [x, y]: [T; 2]) -> [T; 2] {
+    rows.map(|[a, b]| x * a + y * b)
+}

@@ -3,7 +3,7 @@
 //!
 //! Compression is positive here.
 
-use crate::rate::Rate;
+use crate::rate::{Rate, mean};
 use crate::soil::Soil;
 use crate::system::{Iterate, Rates, System};
 use std::mem;
@@ -128,42 +128,49 @@ impl Soil {
         }
     }
 
-    /// By how much stresses lie beyond shear surface, strength, cap and cut-off, kPa.
+    /// By how much stresses lie beyond the shear surface, kPa.
     #[inline]
-    pub(crate) fn excess(&self, s: &[f64; 3], p_p: f64, gamma: f64) -> [f64; 4] {
-        let q = s[0] - s[2];
-        let p = (s[0] + s[1] + s[2]) / 3.0;
-        [
-            q - self.hyperbola(gamma, s[2]).q,
-            q - self.q_f(s[2]).0,
-            self.cap.size(self.cap.q(s), p) - p_p,
-            if self.is_cut_off {
-                -self.R_t - s[2]
-            } else {
-                -1.0
-            },
-        ]
+    pub(crate) fn beyond_shear(&self, s: &[f64; 3], gamma: f64) -> f64 {
+        s[0] - s[2] - self.hyperbola(gamma, s[2]).q
+    }
+
+    /// By how much stresses lie beyond the strength, kPa.
+    #[inline]
+    fn beyond_limit(&self, s: &[f64; 3]) -> f64 {
+        s[0] - s[2] - self.q_f(s[2]).0
+    }
+
+    /// By how much stresses lie beyond the cap, kPa.
+    #[inline]
+    pub(crate) fn beyond_cap(&self, s: &[f64; 3], p_p: f64) -> f64 {
+        self.cap.size(self.cap.q(s), mean(s)) - p_p
+    }
+
+    /// Whether stresses lie beyond the cut-off.
+    #[inline]
+    fn is_beyond_cut_off(&self, s: &[f64; 3], margin: f64) -> bool {
+        self.is_cut_off && -self.R_t - s[2] > margin
     }
 
     /// The surfaces that a trial stress lies beyond.
     #[inline]
     fn violated(&self, trial: &Trial, margin: f64) -> Zone {
-        let [shear, limit, cap, tension] = self.excess(&trial.s, trial.p_p, trial.gamma);
-        // Beyond the strength, flow along it leaves less to the cap, or nothing.
-        let cap = if limit > margin { 0.0 } else { cap };
+        let s = &trial.s;
+        // The strength bounds the hardening from outside: its solution is where to begin. Flow along it leaves less
+        // to the cap, or nothing.
+        let is_limit = self.beyond_limit(s) > margin;
+        let cap = !is_limit && self.beyond_cap(s, trial.p_p) > margin;
         Zone {
-            merged: Merged::None,
-            // The strength bounds the hardening from outside: its solution is where to begin.
-            shear: if limit > margin {
+            shear: if is_limit {
                 Shear::Limit
-            } else if shear > margin {
+            } else if self.beyond_shear(s, trial.gamma) > margin {
                 Shear::Hardening
             } else {
                 Shear::None
             },
-            cap: cap > margin,
-            cylinder: cap > margin && trial.s.iter().sum::<f64>() <= 0.0,
-            tension: tension > margin,
+            cap,
+            cylinder: cap && s.iter().sum::<f64>() <= 0.0,
+            tension: self.is_beyond_cut_off(s, margin),
             ..Zone::ELASTIC
         }
     }
@@ -348,8 +355,7 @@ impl Soil {
             Shear::Limit => {
                 let (reached, ..) = self.gamma(s[0] - s[2], s[2]);
                 if may_harden && reached > gamma * (1.0 + MARGIN) {
-                    let [.., cap, _] = self.excess(s, end.p_p, gamma);
-                    let cap = zone.cap || (trial.guesses && cap > margin);
+                    let cap = zone.cap || (trial.guesses && self.beyond_cap(s, end.p_p) > margin);
                     return Verdict::Other(Zone {
                         shear: Shear::Hardening,
                         cap,
@@ -360,18 +366,17 @@ impl Soil {
                 reached.max(trial.gamma)
             }
         };
-        let [shear, limit, cap, tension] = self.excess(s, end.p_p, gamma);
         let mut other = zone;
-        if zone.shear != Shear::Limit && limit > margin {
+        if zone.shear != Shear::Limit && self.beyond_limit(s) > margin {
             other.shear = Shear::Limit;
-        } else if zone.shear == Shear::None && shear > margin {
+        } else if zone.shear == Shear::None && self.beyond_shear(s, gamma) > margin {
             other.shear = Shear::Hardening;
         }
-        if !zone.cap && cap > margin {
+        if !zone.cap && self.beyond_cap(s, end.p_p) > margin {
             other.cap = true;
             other.cylinder = s.iter().sum::<f64>() <= 0.0;
         }
-        other.tension |= tension > margin;
+        other.tension |= self.is_beyond_cut_off(s, margin);
         if other == zone {
             Verdict::Ends(gamma)
         } else {

@@ -200,8 +200,7 @@ impl Soil {
         let s_1 = first.2.s;
         let middle = 0.5 * (s_0[2] + s_1[2]);
         let [x_1, ..] = self.mobilised(s_1[0] - s_1[2], s_1[2]);
-        let [.., cap, _] = self.excess(&s_0, from.p_p, from.gamma);
-        let is_on_cap = cap > -NEARLY * self.size(&s_0);
+        let is_on_cap = self.beyond_cap(&s_0, from.p_p) > -NEARLY * self.size(&s_0);
         let theta = if is_on_cap { 0.5 } else { 1.0 };
         let [u, ..] = self.dilatancy(x_0, x_1);
         let second = pass(stiffness(middle), u, theta, Some(&first.2))?;
@@ -398,13 +397,12 @@ impl Soil {
         let principal = Principal::of(&point.stress);
         let s = principal.values;
         let rate = principal.turn().normal(&derivative.stress);
-        let [shear, _, cap, _] = self.excess(&s, point.p_p, point.gamma);
-        if shear > 0.0 {
+        if self.beyond_shear(&s, point.gamma) > 0.0 {
             let (gamma, by_q, by_minor) = self.gamma(s[0] - s[2], s[2]);
             point.gamma = gamma;
             derivative.gamma = (rate[0] - rate[2]) * by_q + rate[2] * by_minor;
         }
-        if cap > 0.0 {
+        if self.beyond_cap(&s, point.p_p) > 0.0 {
             let (q, p) = (self.cap.q(&s), ((s[0] + s[1] + s[2]) / 3.0).max(0.0));
             point.p_p = self.cap.size(q, p);
             let by_q = q / (self.cap.M * self.cap.M * point.p_p);
