@@ -92,13 +92,13 @@ pub(crate) struct Trial {
 
 /// Where a trial stress returns to.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct End {
+pub(crate) struct End<'a> {
     pub(crate) zone: Zone,
     pub(crate) s: [f64; 3],
     pub(crate) p_p: f64,
     pub(crate) gamma: f64,
-    /// What the return ended with; none if it was elastic or to the corner.
-    iterate: Option<Iterate>,
+    /// The equations and their solution; none if the return was elastic or to the corner.
+    pub(crate) solved: Option<(System<'a>, Iterate)>,
 }
 
 /// Relative margin of a surface that a stress is on.
@@ -178,17 +178,17 @@ impl Soil {
     /// Returns a trial stress, Eq. (15). None if the iterations fail: then a smaller step may not.
     /// `guess` are zone and multipliers of a return from nearby.
     #[inline]
-    pub(crate) fn return_stress(&self, trial: &Trial, guess: Option<&End>) -> Option<End> {
+    pub(crate) fn return_stress(&self, trial: Trial, guess: Option<&End<'_>>) -> Option<End<'_>> {
         let size = self.size(&trial.s);
         let margin = MARGIN * size;
-        let mut zone = self.violated(trial, margin);
+        let mut zone = self.violated(&trial, margin);
         if zone.is_elastic() {
             return Some(End {
                 zone,
                 s: trial.s,
                 p_p: trial.p_p,
                 gamma: trial.gamma,
-                iterate: None,
+                solved: None,
             });
         }
         let equal = |x: f64, y: f64| x - y <= margin;
@@ -205,8 +205,8 @@ impl Soil {
             base
         };
         let mut multipliers = [0.0; 2];
-        if let Some((guess, iterate)) = guess.and_then(|end| Some((end.zone, end.iterate?))) {
-            (zone, multipliers) = (guess, iterate.multipliers);
+        if let Some((guess, iterate)) = guess.and_then(|end| end.solved.as_ref()) {
+            (zone, multipliers) = (guess.zone, iterate.multipliers);
         } else if trial.guesses
             && zone.merged == Merged::None
             && (zone.shear != Shear::None || zone.cap)
@@ -242,10 +242,10 @@ impl Soil {
                         s: end.s,
                         p_p: end.p_p,
                         gamma,
-                        iterate: Some(end),
+                        solved: Some((system, end)),
                     });
                 }
-                Verdict::Corner => return Some(self.corner(trial)),
+                Verdict::Corner => return Some(self.corner(&trial)),
                 Verdict::None => return None,
                 Verdict::Merge(merged) => zone.merged = merged,
                 Verdict::Other(other) => {
@@ -289,7 +289,7 @@ impl Soil {
 
     /// All stresses at the apex or the tensile strength.
     #[inline]
-    fn corner(&self, trial: &Trial) -> End {
+    fn corner(&self, trial: &Trial) -> End<'_> {
         End {
             zone: Zone {
                 corner: true,
@@ -298,14 +298,14 @@ impl Soil {
             s: [-self.R_t; 3],
             p_p: trial.p_p,
             gamma: trial.gamma,
-            iterate: None,
+            solved: None,
         }
     }
 
     /// Whether a solution with these active surfaces is the return.
     #[inline]
     fn judge(&self, system: &System<'_>, end: &Iterate, margin: f64, may_harden: bool) -> Verdict {
-        let (zone, trial) = (system.zone, system.trial);
+        let (zone, trial) = (system.zone, &system.trial);
         let s = &end.s;
         let [Lambda, mu] = end.multipliers;
         if zone.shear != Shear::None && Lambda < 0.0 {
@@ -383,30 +383,13 @@ impl Soil {
             Verdict::Other(other)
         }
     }
-
-    /// The equations that an end satisfies, if it is neither elastic nor the corner.
-    #[inline]
-    pub(crate) fn system<'a>(
-        &'a self,
-        trial: &'a Trial,
-        end: &'a End,
-    ) -> Option<(System<'a>, &'a Iterate)> {
-        let iterate = end.iterate.as_ref()?;
-        let hardening = self.cap.hardening(self, trial.p_p);
-        Some((System::new(self, trial, end.zone, hardening), iterate))
-    }
 }
 
-impl End {
+impl End<'_> {
     /// Rates of an end, from the rates of what it depends on; those of p_p and γ_ps if they are asked for.
     #[inline]
-    pub(crate) fn rates<const N: usize>(
-        &self,
-        system: Option<&(System<'_>, &Iterate)>,
-        of: &Rates<N>,
-        with_variables: bool,
-    ) -> Rates<N> {
-        match system {
+    pub(crate) fn rates<const N: usize>(&self, of: &Rates<N>, with_variables: bool) -> Rates<N> {
+        match &self.solved {
             Some((system, iterate)) => system.rates(iterate, of, with_variables),
             None if self.zone.corner => Rates {
                 s: [Rate::ZERO; 3],
@@ -416,24 +399,24 @@ impl End {
         }
     }
 
-    /// What the return leaves of a shear stress between two principal axes, Eq. (20).
+    /// What the return of a trial stress leaves of a shear stress between two principal axes, Eq. (20).
     #[inline]
-    pub(crate) fn kappa(&self, soil: &Soil, trial: &Trial, [i, j]: [usize; 2]) -> f64 {
+    pub(crate) fn kappa(&self, soil: &Soil, trial: &[f64; 3], [i, j]: [usize; 2]) -> f64 {
         if self.zone.corner {
             return 0.0;
         }
-        let gap = trial.s[i] - trial.s[j];
-        if gap > MARGIN * soil.size(&trial.s) {
+        let gap = trial[i] - trial[j];
+        let margin = MARGIN * soil.size(trial);
+        if gap > margin {
             return (self.s[i] - self.s[j]) / gap;
         }
         // Of equal stresses those merge that flow would separate.
-        match self.iterate {
-            Some(_) if self.zone.shear != Shear::None || self.zone.cap => {
-                let isotropic = trial.s[0] - trial.s[2] <= MARGIN * soil.size(&trial.s);
-                if isotropic && self.zone.cap {
-                    let mu = self.iterate.map_or(0.0, |end| end.multipliers[1]);
+        match &self.solved {
+            Some((system, end)) if self.zone.shear != Shear::None || self.zone.cap => {
+                let Trial { theta, E, .. } = system.trial;
+                if trial[0] - trial[2] <= margin && self.zone.cap {
                     let M = soil.cap.M;
-                    1.0 / (1.0 + 6.0 * mu * trial.theta * soil.G * trial.E / (M * M))
+                    1.0 / (1.0 + 6.0 * end.multipliers[1] * theta * soil.G * E / (M * M))
                 } else {
                     0.0
                 }

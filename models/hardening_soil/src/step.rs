@@ -114,13 +114,13 @@ struct Part<'a, const N: usize> {
 }
 
 /// Both passes of a step.
-struct Step<const N: usize> {
+struct Step<'a, const N: usize> {
     start: Principal<N>,
     /// sin φ_m where shear flow begins, with its derivatives by γ_ps and by the minor stress.
     mobilised: [f64; 3],
     /// Minor stress at mid-step.
     middle: f64,
-    passes: [(Principal<N>, Trial, End); 2],
+    passes: [(Principal<N>, End<'a>); 2],
     strain: [f64; N],
     end: Point<N>,
     /// Size that the error is relative to, kPa.
@@ -158,7 +158,7 @@ impl Soil {
 
     /// One step: Eqs. (13) to (15). None if a return fails.
     #[inline]
-    fn step<const N: usize>(&self, from: &Point<N>, part: &Part<'_, N>) -> Option<Step<N>> {
+    fn step<const N: usize>(&self, from: &Point<N>, part: &Part<'_, N>) -> Option<Step<'_, N>> {
         let strain = part.increment.strain.map(|e| part.fraction * e);
         let unit = self.unit_stress(&strain);
         let start = Principal::of(&from.stress);
@@ -166,11 +166,11 @@ impl Soil {
         let begin = self.hyperbola(from.gamma, s_0[2]);
         let [x_0, by_q, by_minor] = self.mobilised(begin.q, s_0[2]);
         let mobilised = [x_0, by_q * begin.by_gamma, by_q * begin.by_minor + by_minor];
-        let pass = |E: f64, sin_psi: f64, theta: f64, guess: Option<&End>| {
+        let pass = |E: f64, sin_psi: f64, theta: f64, guess: Option<&End<'_>>| {
             let tolerance = if guess.is_some() { ACCURATE } else { PREDICTED };
             let trial: [f64; N] = array::from_fn(|i| from.stress[i] + E * unit[i]);
             let principal = Principal::of(&trial);
-            let mut trial = Trial {
+            let trial = |guesses, theta| Trial {
                 s: principal.values,
                 start: s_0,
                 E,
@@ -181,30 +181,28 @@ impl Soil {
                 slowing: part.increment.slowing,
                 theta,
                 tolerance,
-                guesses: true,
+                guesses,
             };
-            let mut end = self.return_stress(&trial, guess);
-            if end.is_none() {
-                trial.guesses = false;
-                end = self.return_stress(&trial, guess);
-            }
-            if end.is_none() {
-                trial.theta = 1.0;
-                end = self.return_stress(&trial, None);
-            }
-            let end = end?;
-            Some((principal, trial, end))
+            let attempts = [
+                (true, theta, guess),
+                (false, theta, guess),
+                (false, 1.0, None),
+            ];
+            let mut ends = attempts
+                .into_iter()
+                .map(|(guesses, theta, guess)| self.return_stress(trial(guesses, theta), guess));
+            Some((principal, ends.find_map(|end| end)?))
         };
         let stiffness = |minor| part.increment.stiffening * self.stiffness(minor).0;
         let first = pass(stiffness(s_0[2]), self.dilatancy(x_0, x_0)[0], 1.0, None)?;
-        let s_1 = first.2.s;
+        let s_1 = first.1.s;
         let middle = 0.5 * (s_0[2] + s_1[2]);
         let [x_1, ..] = self.mobilised(s_1[0] - s_1[2], s_1[2]);
         let is_on_cap = self.beyond_cap(&s_0, from.p_p) > -NEARLY * self.size(&s_0);
         let theta = if is_on_cap { 0.5 } else { 1.0 };
         let [u, ..] = self.dilatancy(x_0, x_1);
-        let second = pass(stiffness(middle), u, theta, Some(&first.2))?;
-        let s_2 = second.2.s;
+        let second = pass(stiffness(middle), u, theta, Some(&first.1))?;
+        let s_2 = second.1.s;
         let off = (0..3).map(|i| (s_2[i] - s_1[i]).abs()).fold(0.0, f64::max);
         let size = self.size(&s_0).max(SMALL_STRESS * self.p_ref);
         Some(Step {
@@ -214,8 +212,8 @@ impl Soil {
             strain,
             end: Point {
                 stress: second.0.compose(&s_2),
-                p_p: second.2.p_p,
-                gamma: second.2.gamma,
+                p_p: second.1.p_p,
+                gamma: second.1.gamma,
             },
             passes: [first, second],
             size,
@@ -227,11 +225,11 @@ impl Soil {
     #[inline]
     fn differentiate<const N: usize>(
         &self,
-        step: &Step<N>,
+        step: &Step<'_, N>,
         from: &Derivative<N>,
         part: &Part<'_, N>,
     ) -> (Derivative<N>, Rate<N>) {
-        let [(axes_1, trial_1, end_1), (axes_2, trial_2, end_2)] = &step.passes;
+        let [(axes_1, end_1), (axes_2, end_2)] = &step.passes;
         let Increment {
             stiffening,
             stiffening_slope,
@@ -257,7 +255,6 @@ impl Soil {
             0.0
         };
         let (start, turn_1, turn_2) = (step.start.turn(), axes_1.turn(), axes_2.turn());
-        let (system_1, system_2) = (self.system(trial_1, end_1), self.system(trial_2, end_2));
         // Nothing follows a whole increment.
         let is_last = part.fraction >= 1.0;
         let d_s_0 = if part.is_first {
@@ -282,20 +279,20 @@ impl Soil {
             gamma: from.gamma,
             slowing: part.increment.slowing_slope,
         };
-        of.s = turn_1.normal(&trial(trial_1.E, of.E));
-        let d_s_1 = end_1.rates(system_1.as_ref(), &of, false).s;
+        of.s = turn_1.normal(&trial(stiffening * E_0, of.E));
+        let d_s_1 = end_1.rates(&of, false).s;
         let d_middle = (d_s_0[2] + d_s_1[2]) * 0.5;
         of.E = d_middle * (stiffening * E_slope) + *stiffening_slope * E;
-        let mut moved = turn_2.stress(&trial(trial_2.E, of.E));
+        let mut moved = turn_2.stress(&trial(stiffening * E, of.E));
         of.s = [moved[0], moved[1], moved[2]];
         let d_x_1 = (d_s_1[0] - d_s_1[2]) * x_1_by_q + d_s_1[2] * x_1_by_minor;
         of.sin_psi = d_x_0 * over[1] + d_x_1 * over[2];
-        let end = end_2.rates(system_2.as_ref(), &of, !is_last);
+        let end = end_2.rates(&of, !is_last);
         let d_size = self.size_rate(&s_0, &d_s_0) * by_size;
         let error = ((end.s[worst] - d_s_1[worst]) * sign - d_size) * (1.0 / step.size);
         moved[..3].copy_from_slice(&end.s);
         for (i, rate) in moved.iter_mut().enumerate().skip(3) {
-            *rate = *rate * end_2.kappa(self, trial_2, axes_2.pair(i));
+            *rate = *rate * end_2.kappa(self, &axes_2.values, axes_2.pair(i));
         }
         let derivative = Derivative {
             stress: turn_2.back(&moved),
@@ -348,7 +345,7 @@ impl Soil {
         *attempts = attempts.checked_sub(1)?;
         let whole = self.step(&from.0, part);
         // How far the error is from half the tolerance to all of it.
-        let excess = |s: &Step<N>| (2.0 * s.error / self.tolerance - 1.0).clamp(0.0, 1.0);
+        let excess = |s: &Step<'_, N>| (2.0 * s.error / self.tolerance - 1.0).clamp(0.0, 1.0);
         let weighed = whole.as_ref().filter(|step| excess(step) < 1.0);
         let weighed = weighed.map(|step| {
             let (derivative, error) = if part.with_derivative {

@@ -57,7 +57,7 @@ pub(crate) struct Rates<const N: usize> {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct System<'a> {
     soil: &'a Soil,
-    pub(crate) trial: &'a Trial,
+    pub(crate) trial: Trial,
     pub(crate) zone: Zone,
     /// Gradient of q̃.
     a: [f64; 3],
@@ -78,7 +78,7 @@ pub(crate) struct System<'a> {
 
 impl<'a> System<'a> {
     #[inline]
-    pub(crate) fn new(soil: &'a Soil, trial: &'a Trial, zone: Zone, hardening: Hardening) -> Self {
+    pub(crate) fn new(soil: &'a Soil, trial: Trial, zone: Zone, hardening: Hardening) -> Self {
         let a = soil.cap.gradient(
             zone.merged == Merged::First12,
             zone.merged == Merged::Last23,
