@@ -462,7 +462,9 @@ fn solve(
             return Some(end);
         }
         let step = end.correction(&end.residual);
-        if residual <= tolerance && residual * residual * residual <= 1e-15 * before * before {
+        if residual <= tolerance
+            && residual * residual * residual <= 1e-7 * tolerance * before * before
+        {
             system.correct(&mut end, step);
             return Some(end);
         }

@@ -114,18 +114,27 @@ struct Part<'a, const N: usize> {
 }
 
 /// Both passes of a step.
-struct Step<'a, const N: usize> {
+struct Passes<'a, const N: usize> {
     start: Principal<N>,
     /// sin φ_m where shear flow begins, with its derivatives by γ_ps and by the minor stress.
     mobilised: [f64; 3],
     /// Minor stress at mid-step.
     middle: f64,
-    passes: [(Principal<N>, End<'a>); 2],
+    axes: [&'a Principal<N>; 2],
+    ends: [&'a End<'a>; 2],
     strain: [f64; N],
-    end: Point<N>,
     /// Size that the error is relative to, kPa.
     size: f64,
     error: f64,
+}
+
+/// Where a step ends.
+struct Step<const N: usize> {
+    at: (Point<N>, Derivative<N>),
+    /// How far the error is from half the tolerance to all of it, 0 to 1.
+    excess: f64,
+    /// Rate of the error.
+    error: Rate<N>,
 }
 
 impl Soil {
@@ -156,9 +165,13 @@ impl Soil {
         })
     }
 
-    /// One step: Eqs. (13) to (15). None if a return fails.
+    /// One step: Eqs. (15) to (19), with the derivative where its error is below the tolerance. None if a return fails.
     #[inline]
-    fn step<const N: usize>(&self, from: &Point<N>, part: &Part<'_, N>) -> Option<Step<'_, N>> {
+    fn step<const N: usize>(
+        &self,
+        (from, derivative): &(Point<N>, Derivative<N>),
+        part: &Part<'_, N>,
+    ) -> Option<Step<N>> {
         let strain = part.increment.strain.map(|e| part.fraction * e);
         let unit = self.unit_stress(&strain);
         let start = Principal::of(&from.stress);
@@ -183,53 +196,66 @@ impl Soil {
                 tolerance,
                 guesses,
             };
-            let attempts = [
-                (true, theta, guess),
-                (false, theta, guess),
-                (false, 1.0, None),
-            ];
-            let mut ends = attempts
-                .into_iter()
-                .map(|(guesses, theta, guess)| self.return_stress(trial(guesses, theta), guess));
-            Some((principal, ends.find_map(|end| end)?))
+            let mut end = self.return_stress(trial(true, theta), guess);
+            if end.is_none() {
+                end = self.return_stress(trial(false, theta), guess);
+            }
+            if end.is_none() {
+                end = self.return_stress(trial(false, 1.0), None);
+            }
+            (principal, end)
         };
         let stiffness = |minor| part.increment.stiffening * self.stiffness(minor).0;
-        let first = pass(stiffness(s_0[2]), self.dilatancy(x_0, x_0)[0], 1.0, None)?;
-        let s_1 = first.1.s;
+        let (axes_1, end_1) = &pass(stiffness(s_0[2]), self.dilatancy(x_0, x_0)[0], 1.0, None);
+        let end_1 = end_1.as_ref()?;
+        let s_1 = end_1.s;
         let middle = 0.5 * (s_0[2] + s_1[2]);
         let [x_1, ..] = self.mobilised(s_1[0] - s_1[2], s_1[2]);
         let is_on_cap = self.beyond_cap(&s_0, from.p_p) > -NEARLY * self.size(&s_0);
         let theta = if is_on_cap { 0.5 } else { 1.0 };
         let [u, ..] = self.dilatancy(x_0, x_1);
-        let second = pass(stiffness(middle), u, theta, Some(&first.1))?;
-        let s_2 = second.1.s;
-        let off = (0..3).map(|i| (s_2[i] - s_1[i]).abs()).fold(0.0, f64::max);
+        let (axes_2, end_2) = &pass(stiffness(middle), u, theta, Some(end_1));
+        let end_2 = end_2.as_ref()?;
+        let off = (0..3)
+            .map(|i| (end_2.s[i] - s_1[i]).abs())
+            .fold(0.0, f64::max);
         let size = self.size(&s_0).max(SMALL_STRESS * self.p_ref);
-        Some(Step {
-            start,
-            mobilised,
-            middle,
-            strain,
-            end: Point {
-                stress: second.0.compose(&s_2),
-                p_p: second.1.p_p,
-                gamma: second.1.gamma,
-            },
-            passes: [first, second],
-            size,
-            error: off / size,
-        })
+        let error = off / size;
+        let end = Point {
+            stress: axes_2.compose(&end_2.s),
+            p_p: end_2.p_p,
+            gamma: end_2.gamma,
+        };
+        let mut step = Step {
+            at: (end, Derivative::ZERO),
+            excess: (2.0 * error / self.tolerance - 1.0).clamp(0.0, 1.0),
+            error: Rate::ZERO,
+        };
+        if part.with_derivative && step.excess < 1.0 {
+            let passes = Passes {
+                start,
+                mobilised,
+                middle,
+                axes: [axes_1, axes_2],
+                ends: [end_1, end_2],
+                strain,
+                size,
+                error,
+            };
+            (step.at.1, step.error) = self.differentiate(&passes, derivative, part);
+        }
+        Some(step)
     }
 
     /// The derivative of a step's end, and of its error, from the derivative of its start.
     #[inline]
     fn differentiate<const N: usize>(
         &self,
-        step: &Step<'_, N>,
+        step: &Passes<'_, N>,
         from: &Derivative<N>,
         part: &Part<'_, N>,
     ) -> (Derivative<N>, Rate<N>) {
-        let [(axes_1, end_1), (axes_2, end_2)] = &step.passes;
+        let ([axes_1, axes_2], [end_1, end_2]) = (step.axes, step.ends);
         let Increment {
             stiffening,
             stiffening_slope,
@@ -254,13 +280,13 @@ impl Soil {
         } else {
             0.0
         };
-        let (start, turn_1, turn_2) = (step.start.turn(), axes_1.turn(), axes_2.turn());
+        let (turn_1, turn_2) = (axes_1.turn(), axes_2.turn());
         // Nothing follows a whole increment.
         let is_last = part.fraction >= 1.0;
         let d_s_0 = if part.is_first {
             [Rate::ZERO; 3]
         } else {
-            start.normal(&from.stress)
+            step.start.turn().normal(&from.stress)
         };
         let d_x_0 = from.gamma * x_0_by_gamma + d_s_0[2] * x_0_by_minor;
         let trial = |E: f64, d_E: Rate<N>| -> [Rate<N>; N] {
@@ -343,22 +369,11 @@ impl Soil {
         attempts: &mut u32,
     ) -> Option<(Point<N>, Derivative<N>)> {
         *attempts = attempts.checked_sub(1)?;
-        let whole = self.step(&from.0, part);
-        // How far the error is from half the tolerance to all of it.
-        let excess = |s: &Step<'_, N>| (2.0 * s.error / self.tolerance - 1.0).clamp(0.0, 1.0);
-        let weighed = whole.as_ref().filter(|step| excess(step) < 1.0);
-        let weighed = weighed.map(|step| {
-            let (derivative, error) = if part.with_derivative {
-                self.differentiate(step, &from.1, part)
-            } else {
-                (Derivative::ZERO, Rate::ZERO)
-            };
-            (step.end, derivative, excess(step), error)
-        });
-        if let Some((end, derivative, weight, _)) = weighed
-            && weight <= 0.0
+        let whole = self.step(from, part);
+        if let Some(step) = &whole
+            && step.excess <= 0.0
         {
-            return Some((end, derivative));
+            return Some(step.at);
         }
         let halvings = halvings.checked_sub(1)?;
         let mut half = Part {
@@ -368,7 +383,12 @@ impl Soil {
         let middle = self.advance(from, &half, halvings, attempts)?;
         half.is_first = false;
         let halves = self.advance(&middle, &half, halvings, attempts)?;
-        let Some((end, derivative, excess, error)) = weighed else {
+        let Some(Step {
+            at: (end, derivative),
+            excess,
+            error,
+        }) = whole.filter(|step| step.excess < 1.0)
+        else {
             return Some(halves);
         };
         // Smooth at both ends.
