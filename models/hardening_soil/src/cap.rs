@@ -2,6 +2,7 @@
 //!
 //! Compression is positive here.
 
+use crate::rate::Linear;
 use crate::soil::{FLOOR, Soil};
 use abi::Refusal;
 
@@ -106,8 +107,8 @@ impl Cap {
 
     /// q̃ of principal stresses in descending order, Eq. (9).
     #[inline]
-    pub(crate) fn q(&self, s: &[f64; 3]) -> f64 {
-        s[0] + (self.delta - 1.0) * s[1] - self.delta * s[2]
+    pub(crate) fn q<T: Linear>(&self, s: &[T; 3]) -> T {
+        s[0] + s[1] * (self.delta - 1.0) - s[2] * self.delta
     }
 
     /// Gradient of q̃; on an edge the mean of its sides.

@@ -3,6 +3,7 @@
 #![expect(non_snake_case, reason = "the letters of LAW.md: G is not g, M not m")]
 
 mod cap;
+mod rate;
 mod return_mapping;
 mod small;
 mod small_law;

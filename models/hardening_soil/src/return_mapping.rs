@@ -3,6 +3,7 @@
 //!
 //! Compression is positive here.
 
+use crate::rate::{Rate, mean};
 use crate::soil::Soil;
 use crate::system::{Iterate, Rates, System};
 use std::mem;
@@ -91,13 +92,13 @@ pub(crate) struct Trial {
 
 /// Where a trial stress returns to.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct End {
+pub(crate) struct End<'a> {
     pub(crate) zone: Zone,
     pub(crate) s: [f64; 3],
     pub(crate) p_p: f64,
     pub(crate) gamma: f64,
-    /// What the return ended with; none if it was elastic or to the corner.
-    iterate: Option<Iterate>,
+    /// The equations and their solution; none if the return was elastic or to the corner.
+    pub(crate) solved: Option<(System<'a>, Iterate)>,
 }
 
 /// Relative margin of a surface that a stress is on.
@@ -116,10 +117,10 @@ impl Soil {
 
     /// Rate of [`size`](Self::size).
     #[inline]
-    pub(crate) fn size_rate(&self, s: &[f64; 3], rate: &[f64; 3]) -> f64 {
+    pub(crate) fn size_rate<const N: usize>(&self, s: &[f64; 3], rate: &[Rate<N>; 3]) -> Rate<N> {
         let (major, minor) = (s[0].abs(), s[2].abs());
         if major.max(minor) < self.c_cos_phi {
-            0.0
+            Rate::ZERO
         } else if major >= minor {
             rate[0] * s[0].signum()
         } else {
@@ -127,42 +128,49 @@ impl Soil {
         }
     }
 
-    /// By how much stresses lie beyond shear surface, strength, cap and cut-off, kPa.
+    /// By how much stresses lie beyond the shear surface, kPa.
     #[inline]
-    pub(crate) fn excess(&self, s: &[f64; 3], p_p: f64, gamma: f64) -> [f64; 4] {
-        let q = s[0] - s[2];
-        let p = (s[0] + s[1] + s[2]) / 3.0;
-        [
-            q - self.hyperbola(gamma, s[2]).q,
-            q - self.q_f(s[2]).0,
-            self.cap.size(self.cap.q(s), p) - p_p,
-            if self.is_cut_off {
-                -self.R_t - s[2]
-            } else {
-                -1.0
-            },
-        ]
+    pub(crate) fn beyond_shear(&self, s: &[f64; 3], gamma: f64) -> f64 {
+        s[0] - s[2] - self.hyperbola(gamma, s[2]).q
+    }
+
+    /// By how much stresses lie beyond the strength, kPa.
+    #[inline]
+    fn beyond_limit(&self, s: &[f64; 3]) -> f64 {
+        s[0] - s[2] - self.q_f(s[2]).0
+    }
+
+    /// By how much stresses lie beyond the cap, kPa.
+    #[inline]
+    pub(crate) fn beyond_cap(&self, s: &[f64; 3], p_p: f64) -> f64 {
+        self.cap.size(self.cap.q(s), mean(s)) - p_p
+    }
+
+    /// Whether stresses lie beyond the cut-off.
+    #[inline]
+    fn is_beyond_cut_off(&self, s: &[f64; 3], margin: f64) -> bool {
+        self.is_cut_off && -self.R_t - s[2] > margin
     }
 
     /// The surfaces that a trial stress lies beyond.
     #[inline]
     fn violated(&self, trial: &Trial, margin: f64) -> Zone {
-        let [shear, limit, cap, tension] = self.excess(&trial.s, trial.p_p, trial.gamma);
-        // Beyond the strength, flow along it leaves less to the cap, or nothing.
-        let cap = if limit > margin { 0.0 } else { cap };
+        let s = &trial.s;
+        // The strength bounds the hardening from outside: its solution is where to begin. Flow along it leaves less
+        // to the cap, or nothing.
+        let is_limit = self.beyond_limit(s) > margin;
+        let cap = !is_limit && self.beyond_cap(s, trial.p_p) > margin;
         Zone {
-            merged: Merged::None,
-            // The strength bounds the hardening from outside: its solution is where to begin.
-            shear: if limit > margin {
+            shear: if is_limit {
                 Shear::Limit
-            } else if shear > margin {
+            } else if self.beyond_shear(s, trial.gamma) > margin {
                 Shear::Hardening
             } else {
                 Shear::None
             },
-            cap: cap > margin,
-            cylinder: cap > margin && trial.s.iter().sum::<f64>() <= 0.0,
-            tension: tension > margin,
+            cap,
+            cylinder: cap && s.iter().sum::<f64>() <= 0.0,
+            tension: self.is_beyond_cut_off(s, margin),
             ..Zone::ELASTIC
         }
     }
@@ -170,17 +178,17 @@ impl Soil {
     /// Returns a trial stress, Eq. (15). None if the iterations fail: then a smaller step may not.
     /// `guess` are zone and multipliers of a return from nearby.
     #[inline]
-    pub(crate) fn return_stress(&self, trial: &Trial, guess: Option<&End>) -> Option<End> {
+    pub(crate) fn return_stress(&self, trial: Trial, guess: Option<&End<'_>>) -> Option<End<'_>> {
         let size = self.size(&trial.s);
         let margin = MARGIN * size;
-        let mut zone = self.violated(trial, margin);
+        let mut zone = self.violated(&trial, margin);
         if zone.is_elastic() {
             return Some(End {
                 zone,
                 s: trial.s,
                 p_p: trial.p_p,
                 gamma: trial.gamma,
-                iterate: None,
+                solved: None,
             });
         }
         let equal = |x: f64, y: f64| x - y <= margin;
@@ -197,8 +205,8 @@ impl Soil {
             base
         };
         let mut multipliers = [0.0; 2];
-        if let Some((guess, iterate)) = guess.and_then(|end| Some((end.zone, end.iterate?))) {
-            (zone, multipliers) = (guess, iterate.multipliers);
+        if let Some((guess, iterate)) = guess.and_then(|end| end.solved.as_ref()) {
+            (zone, multipliers) = (guess.zone, iterate.multipliers);
         } else if trial.guesses
             && zone.merged == Merged::None
             && (zone.shear != Shear::None || zone.cap)
@@ -234,10 +242,10 @@ impl Soil {
                         s: end.s,
                         p_p: end.p_p,
                         gamma,
-                        iterate: Some(end),
+                        solved: Some((system, end)),
                     });
                 }
-                Verdict::Corner => return Some(self.corner(trial)),
+                Verdict::Corner => return Some(self.corner(&trial)),
                 Verdict::None => return None,
                 Verdict::Merge(merged) => zone.merged = merged,
                 Verdict::Other(other) => {
@@ -281,7 +289,7 @@ impl Soil {
 
     /// All stresses at the apex or the tensile strength.
     #[inline]
-    fn corner(&self, trial: &Trial) -> End {
+    fn corner(&self, trial: &Trial) -> End<'_> {
         End {
             zone: Zone {
                 corner: true,
@@ -290,14 +298,14 @@ impl Soil {
             s: [-self.R_t; 3],
             p_p: trial.p_p,
             gamma: trial.gamma,
-            iterate: None,
+            solved: None,
         }
     }
 
     /// Whether a solution with these active surfaces is the return.
     #[inline]
     fn judge(&self, system: &System<'_>, end: &Iterate, margin: f64, may_harden: bool) -> Verdict {
-        let (zone, trial) = (system.zone, system.trial);
+        let (zone, trial) = (system.zone, &system.trial);
         let s = &end.s;
         let [Lambda, mu] = end.multipliers;
         if zone.shear != Shear::None && Lambda < 0.0 {
@@ -347,8 +355,7 @@ impl Soil {
             Shear::Limit => {
                 let (reached, ..) = self.gamma(s[0] - s[2], s[2]);
                 if may_harden && reached > gamma * (1.0 + MARGIN) {
-                    let [.., cap, _] = self.excess(s, end.p_p, gamma);
-                    let cap = zone.cap || (trial.guesses && cap > margin);
+                    let cap = zone.cap || (trial.guesses && self.beyond_cap(s, end.p_p) > margin);
                     return Verdict::Other(Zone {
                         shear: Shear::Hardening,
                         cap,
@@ -359,72 +366,57 @@ impl Soil {
                 reached.max(trial.gamma)
             }
         };
-        let [shear, limit, cap, tension] = self.excess(s, end.p_p, gamma);
         let mut other = zone;
-        if zone.shear != Shear::Limit && limit > margin {
+        if zone.shear != Shear::Limit && self.beyond_limit(s) > margin {
             other.shear = Shear::Limit;
-        } else if zone.shear == Shear::None && shear > margin {
+        } else if zone.shear == Shear::None && self.beyond_shear(s, gamma) > margin {
             other.shear = Shear::Hardening;
         }
-        if !zone.cap && cap > margin {
+        if !zone.cap && self.beyond_cap(s, end.p_p) > margin {
             other.cap = true;
             other.cylinder = s.iter().sum::<f64>() <= 0.0;
         }
-        other.tension |= tension > margin;
+        other.tension |= self.is_beyond_cut_off(s, margin);
         if other == zone {
             Verdict::Ends(gamma)
         } else {
             Verdict::Other(other)
         }
     }
-
-    /// The equations that an end satisfies, if it is neither elastic nor the corner.
-    #[inline]
-    pub(crate) fn system<'a>(
-        &'a self,
-        trial: &'a Trial,
-        end: &End,
-    ) -> Option<(System<'a>, Iterate)> {
-        let hardening = self.cap.hardening(self, trial.p_p);
-        let iterate = end.iterate?;
-        Some((System::new(self, trial, end.zone, hardening), iterate))
-    }
 }
 
-impl End {
+impl End<'_> {
     /// Rates of an end, from the rates of what it depends on; those of p_p and γ_ps if they are asked for.
     #[inline]
-    pub(crate) fn rates(
-        &self,
-        system: Option<&(System<'_>, Iterate)>,
-        of: &Rates,
-        with_variables: bool,
-    ) -> Rates {
-        match system {
+    pub(crate) fn rates<const N: usize>(&self, of: &Rates<N>, with_variables: bool) -> Rates<N> {
+        match &self.solved {
             Some((system, iterate)) => system.rates(iterate, of, with_variables),
-            None if self.zone.corner => Rates { s: [0.0; 3], ..*of },
+            None if self.zone.corner => Rates {
+                s: [Rate::ZERO; 3],
+                ..*of
+            },
             None => *of,
         }
     }
 
-    /// What the return leaves of a shear stress between two principal axes, Eq. (20).
+    /// What the return of a trial stress leaves of a shear stress between two principal axes, Eq. (20).
     #[inline]
-    pub(crate) fn kappa(&self, soil: &Soil, trial: &Trial, [i, j]: [usize; 2]) -> f64 {
+    pub(crate) fn kappa(&self, soil: &Soil, trial: &[f64; 3], [i, j]: [usize; 2]) -> f64 {
         if self.zone.corner {
             return 0.0;
         }
-        let gap = trial.s[i] - trial.s[j];
-        if gap > MARGIN * soil.size(&trial.s) {
+        let gap = trial[i] - trial[j];
+        let margin = MARGIN * soil.size(trial);
+        if gap > margin {
             return (self.s[i] - self.s[j]) / gap;
         }
         // Of equal stresses those merge that flow would separate.
-        match self.iterate {
-            Some(_) if self.zone.shear != Shear::None || self.zone.cap => {
-                let isotropic = trial.s[0] - trial.s[2] <= MARGIN * soil.size(&trial.s);
-                if isotropic && self.zone.cap {
-                    let mu = self.iterate.map_or(0.0, |end| end.multipliers[1]);
+        match &self.solved {
+            Some((system, end)) if self.zone.shear != Shear::None || self.zone.cap => {
+                let Trial { theta, E, .. } = system.trial;
+                if trial[0] - trial[2] <= margin && self.zone.cap {
                     let M = soil.cap.M;
-                    1.0 / (1.0 + 6.0 * mu * trial.theta * soil.G * trial.E / (M * M))
+                    1.0 / (1.0 + 6.0 * end.multipliers[1] * theta * soil.G * E / (M * M))
                 } else {
                     0.0
                 }
@@ -450,6 +442,7 @@ enum Verdict {
 
 /// Newton's method for the multipliers. It ends with the last change of stress where what that leaves out is below
 /// round-off by the rate of convergence so far.
+/// The first pass bears on the end through E and u alone: a hundred times more may be left out of it.
 #[inline]
 fn solve(
     system: &System<'_>,
@@ -470,7 +463,9 @@ fn solve(
             return Some(end);
         }
         let step = end.correction(&end.residual);
-        if residual <= tolerance && residual * residual * residual <= 1e-15 * before * before {
+        if residual <= tolerance
+            && residual * residual * residual <= 1e-7 * tolerance * before * before
+        {
             system.correct(&mut end, step);
             return Some(end);
         }

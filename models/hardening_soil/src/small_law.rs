@@ -166,8 +166,8 @@ impl HardeningSoilSmall {
                 let most = 1e3 * of(now) / size;
                 (one_sided(sides) / step).clamp(-most, most)
             };
-            increment.stiffening_slope[j] = slope(|r| r.mean);
-            increment.slowing_slope[j] = slope(|r| r.slowing);
+            increment.stiffening_slope.0[j] = slope(|r| r.mean);
+            increment.slowing_slope.0[j] = slope(|r| r.slowing);
         }
     }
 

@@ -1,6 +1,7 @@
 //! Principal values and axes of a symmetric tensor in the plane (11 22 33 12) and in space
 //! (11 22 33 12 13 23).
 
+use crate::rate::Linear;
 use std::array;
 
 /// Row and column of a component.
@@ -82,33 +83,35 @@ impl<const N: usize> Principal<N> {
 impl<const N: usize> Turn<N> {
     /// A stress in the axes: normal components, then shear components.
     #[inline]
-    pub(crate) fn stress(&self, stress: &[f64; N]) -> [f64; N] {
+    pub(crate) fn stress<T: Linear>(&self, stress: &[T; N]) -> [T; N] {
         array::from_fn(|row| {
             let halved = if row < 3 { 1.0 } else { 0.5 };
-            (0..N)
-                .map(|c| {
-                    let twice = if c < 3 { 1.0 } else { 2.0 };
-                    self.rows[row][c] * stress[c] * twice * halved
-                })
-                .sum()
+            total::<T, N>(|c| {
+                let twice = if c < 3 { 1.0 } else { 2.0 };
+                stress[c] * (self.rows[row][c] * twice * halved)
+            })
         })
     }
 
     /// The normal components alone.
     #[inline]
-    pub(crate) fn normal(&self, stress: &[f64; N]) -> [f64; 3] {
+    pub(crate) fn normal<T: Linear>(&self, stress: &[T; N]) -> [T; 3] {
         array::from_fn(|row| {
-            (0..N)
-                .map(|c| self.rows[row][c] * stress[c] * if c < 3 { 1.0 } else { 2.0 })
-                .sum()
+            total::<T, N>(|c| stress[c] * (self.rows[row][c] * if c < 3 { 1.0 } else { 2.0 }))
         })
     }
 
     /// A stress given in the axes.
     #[inline]
-    pub(crate) fn back(&self, stress: &[f64; N]) -> [f64; N] {
-        array::from_fn(|c| (0..N).map(|row| self.rows[row][c] * stress[row]).sum())
+    pub(crate) fn back<T: Linear>(&self, stress: &[T; N]) -> [T; N] {
+        array::from_fn(|c| total::<T, N>(|row| stress[row] * self.rows[row][c]))
     }
+}
+
+/// Sum over all components.
+#[inline]
+fn total<T: Linear, const N: usize>(of: impl Fn(usize) -> T) -> T {
+    (1..N).fold(of(0), |sum, i| sum + of(i))
 }
 
 /// Mohr's circle of 11 22 12, and 33.

@@ -3,6 +3,7 @@
 //!
 //! Compression is positive here.
 
+use crate::rate::{Linear, Rate, mean};
 use crate::return_mapping::{End, Trial};
 use crate::soil::Soil;
 use crate::spectral::Principal;
@@ -26,32 +27,28 @@ const MAX_HALVINGS: u32 = 10;
 /// Steps, whole ones and halves, in an increment.
 const MAX_ATTEMPTS: u32 = 400;
 
-/// Stress and internal variables on their way through an increment.
+/// Stress and internal variables on their way through an increment, or their rates.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Point<const N: usize> {
-    pub(crate) stress: [f64; N],
-    pub(crate) p_p: f64,
-    pub(crate) gamma: f64,
+pub(crate) struct Point<const N: usize, T = f64> {
+    pub(crate) stress: [T; N],
+    pub(crate) p_p: T,
+    pub(crate) gamma: T,
 }
 
-/// Derivatives of a point by the strain increment, a column for each component.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Derivative<const N: usize> {
-    columns: [Point<N>; N],
-}
+/// Derivatives of a point by the strain increment.
+pub(crate) type Derivative<const N: usize> = Point<N, Rate<N>>;
 
 impl<const N: usize> Derivative<N> {
     const ZERO: Self = Self {
-        columns: [Point {
-            stress: [0.0; N],
-            p_p: 0.0,
-            gamma: 0.0,
-        }; N],
+        stress: [Rate::ZERO; N],
+        p_p: Rate::ZERO,
+        gamma: Rate::ZERO,
     };
 
     /// ∂stress/∂strain, row by row.
+    #[inline]
     pub(crate) fn tangent(&self) -> [[f64; N]; N] {
-        array::from_fn(|i| array::from_fn(|j| self.columns[j].stress[i]))
+        self.stress.map(|rate| rate.0)
     }
 }
 
@@ -66,14 +63,16 @@ impl<const N: usize> Point<N> {
             Err(Failure::Numeric("the stress overflows"))
         }
     }
+}
 
+impl<const N: usize, T: Linear> Point<N, T> {
     /// This point and `other`, by their weights.
     #[inline]
     fn sum(&self, own: f64, factor: f64, other: &Self) -> Self {
         Self {
-            stress: array::from_fn(|i| own * self.stress[i] + factor * other.stress[i]),
-            p_p: own * self.p_p + factor * other.p_p,
-            gamma: own * self.gamma + factor * other.gamma,
+            stress: array::from_fn(|i| self.stress[i] * own + other.stress[i] * factor),
+            p_p: self.p_p * own + other.p_p * factor,
+            gamma: self.gamma * own + other.gamma * factor,
         }
     }
 }
@@ -84,10 +83,10 @@ pub(crate) struct Increment<const N: usize> {
     pub(crate) strain: [f64; N],
     /// Young's modulus over that of unloading, and its derivative by the strain.
     pub(crate) stiffening: f64,
-    pub(crate) stiffening_slope: [f64; N],
+    pub(crate) stiffening_slope: Rate<N>,
     /// What γ_ps grows by over the plastic shear strain, and its derivative.
     pub(crate) slowing: f64,
-    pub(crate) slowing_slope: [f64; N],
+    pub(crate) slowing_slope: Rate<N>,
 }
 
 impl<const N: usize> Increment<N> {
@@ -97,9 +96,9 @@ impl<const N: usize> Increment<N> {
         Self {
             strain,
             stiffening: 1.0,
-            stiffening_slope: [0.0; N],
+            stiffening_slope: Rate::ZERO,
             slowing: 1.0,
-            slowing_slope: [0.0; N],
+            slowing_slope: Rate::ZERO,
         }
     }
 }
@@ -115,18 +114,27 @@ struct Part<'a, const N: usize> {
 }
 
 /// Both passes of a step.
-struct Step<const N: usize> {
+struct Passes<'a, const N: usize> {
     start: Principal<N>,
     /// sin φ_m where shear flow begins, with its derivatives by γ_ps and by the minor stress.
     mobilised: [f64; 3],
     /// Minor stress at mid-step.
     middle: f64,
-    passes: [(Principal<N>, Trial, End); 2],
+    axes: [&'a Principal<N>; 2],
+    ends: [&'a End<'a>; 2],
     strain: [f64; N],
-    end: Point<N>,
     /// Size that the error is relative to, kPa.
     size: f64,
     error: f64,
+}
+
+/// Where a step ends.
+struct Step<const N: usize> {
+    at: (Point<N>, Derivative<N>),
+    /// How far the error is from half the tolerance to all of it, 0 to 1.
+    excess: f64,
+    /// Rate of the error.
+    error: Rate<N>,
 }
 
 impl Soil {
@@ -157,9 +165,13 @@ impl Soil {
         })
     }
 
-    /// One step: Eqs. (13) to (15). None if a return fails.
+    /// One step: Eqs. (15) to (19), with the derivative where its error is below the tolerance. None if a return fails.
     #[inline]
-    fn step<const N: usize>(&self, from: &Point<N>, part: &Part<'_, N>) -> Option<Step<N>> {
+    fn step<const N: usize>(
+        &self,
+        (from, derivative): &(Point<N>, Derivative<N>),
+        part: &Part<'_, N>,
+    ) -> Option<Step<N>> {
         let strain = part.increment.strain.map(|e| part.fraction * e);
         let unit = self.unit_stress(&strain);
         let start = Principal::of(&from.stress);
@@ -167,11 +179,11 @@ impl Soil {
         let begin = self.hyperbola(from.gamma, s_0[2]);
         let [x_0, by_q, by_minor] = self.mobilised(begin.q, s_0[2]);
         let mobilised = [x_0, by_q * begin.by_gamma, by_q * begin.by_minor + by_minor];
-        let pass = |E: f64, sin_psi: f64, theta: f64, guess: Option<&End>| {
+        let pass = |E: f64, sin_psi: f64, theta: f64, guess: Option<&End<'_>>| {
             let tolerance = if guess.is_some() { ACCURATE } else { PREDICTED };
             let trial: [f64; N] = array::from_fn(|i| from.stress[i] + E * unit[i]);
             let principal = Principal::of(&trial);
-            let mut trial = Trial {
+            let trial = |guesses, theta| Trial {
                 s: principal.values,
                 start: s_0,
                 E,
@@ -182,58 +194,68 @@ impl Soil {
                 slowing: part.increment.slowing,
                 theta,
                 tolerance,
-                guesses: true,
+                guesses,
             };
-            let mut end = self.return_stress(&trial, guess);
+            let mut end = self.return_stress(trial(true, theta), guess);
             if end.is_none() {
-                trial.guesses = false;
-                end = self.return_stress(&trial, guess);
+                end = self.return_stress(trial(false, theta), guess);
             }
             if end.is_none() {
-                trial.theta = 1.0;
-                end = self.return_stress(&trial, None);
+                end = self.return_stress(trial(false, 1.0), None);
             }
-            let end = end?;
-            Some((principal, trial, end))
+            (principal, end)
         };
         let stiffness = |minor| part.increment.stiffening * self.stiffness(minor).0;
-        let first = pass(stiffness(s_0[2]), self.dilatancy(x_0, x_0)[0], 1.0, None)?;
-        let s_1 = first.2.s;
+        let (axes_1, end_1) = &pass(stiffness(s_0[2]), self.dilatancy(x_0, x_0)[0], 1.0, None);
+        let end_1 = end_1.as_ref()?;
+        let s_1 = end_1.s;
         let middle = 0.5 * (s_0[2] + s_1[2]);
         let [x_1, ..] = self.mobilised(s_1[0] - s_1[2], s_1[2]);
-        let [.., cap, _] = self.excess(&s_0, from.p_p, from.gamma);
-        let is_on_cap = cap > -NEARLY * self.size(&s_0);
+        let is_on_cap = self.beyond_cap(&s_0, from.p_p) > -NEARLY * self.size(&s_0);
         let theta = if is_on_cap { 0.5 } else { 1.0 };
         let [u, ..] = self.dilatancy(x_0, x_1);
-        let second = pass(stiffness(middle), u, theta, Some(&first.2))?;
-        let s_2 = second.2.s;
-        let off = (0..3).map(|i| (s_2[i] - s_1[i]).abs()).fold(0.0, f64::max);
+        let (axes_2, end_2) = &pass(stiffness(middle), u, theta, Some(end_1));
+        let end_2 = end_2.as_ref()?;
+        let off = (0..3)
+            .map(|i| (end_2.s[i] - s_1[i]).abs())
+            .fold(0.0, f64::max);
         let size = self.size(&s_0).max(SMALL_STRESS * self.p_ref);
-        Some(Step {
-            start,
-            mobilised,
-            middle,
-            strain,
-            end: Point {
-                stress: second.0.compose(&s_2),
-                p_p: second.2.p_p,
-                gamma: second.2.gamma,
-            },
-            passes: [first, second],
-            size,
-            error: off / size,
-        })
+        let error = off / size;
+        let end = Point {
+            stress: axes_2.compose(&end_2.s),
+            p_p: end_2.p_p,
+            gamma: end_2.gamma,
+        };
+        let mut step = Step {
+            at: (end, Derivative::ZERO),
+            excess: (2.0 * error / self.tolerance - 1.0).clamp(0.0, 1.0),
+            error: Rate::ZERO,
+        };
+        if part.with_derivative && step.excess < 1.0 {
+            let passes = Passes {
+                start,
+                mobilised,
+                middle,
+                axes: [axes_1, axes_2],
+                ends: [end_1, end_2],
+                strain,
+                size,
+                error,
+            };
+            (step.at.1, step.error) = self.differentiate(&passes, derivative, part);
+        }
+        Some(step)
     }
 
     /// The derivative of a step's end, and of its error, from the derivative of its start.
     #[inline]
     fn differentiate<const N: usize>(
         &self,
-        step: &Step<N>,
+        step: &Passes<'_, N>,
         from: &Derivative<N>,
         part: &Part<'_, N>,
-    ) -> (Derivative<N>, [f64; N]) {
-        let [(axes_1, trial_1, end_1), (axes_2, trial_2, end_2)] = &step.passes;
+    ) -> (Derivative<N>, Rate<N>) {
+        let ([axes_1, axes_2], [end_1, end_2]) = (step.axes, step.ends);
         let Increment {
             stiffening,
             stiffening_slope,
@@ -258,61 +280,52 @@ impl Soil {
         } else {
             0.0
         };
-        let (start, turn_1, turn_2) = (step.start.turn(), axes_1.turn(), axes_2.turn());
-        let (system_1, system_2) = (self.system(trial_1, end_1), self.system(trial_2, end_2));
-        let kappa: [f64; N] = array::from_fn(|i| {
-            if i < 3 {
-                1.0
-            } else {
-                end_2.kappa(self, trial_2, axes_2.pair(i))
-            }
-        });
+        let (turn_1, turn_2) = (axes_1.turn(), axes_2.turn());
         // Nothing follows a whole increment.
         let is_last = part.fraction >= 1.0;
-        let mut error = [0.0; N];
-        let columns = array::from_fn(|j| {
-            let column = &from.columns[j];
-            let d_s_0 = if part.is_first {
-                [0.0; 3]
-            } else {
-                start.normal(&column.stress)
-            };
-            let d_x_0 = x_0_by_gamma * column.gamma + x_0_by_minor * d_s_0[2];
-            let mut of = Rates {
-                start: d_s_0,
-                p_p: column.p_p,
-                gamma: column.gamma,
-                slowing: part.increment.slowing_slope[j],
-                ..Rates::default()
-            };
-            let mut strain = [0.0; N];
-            strain[j] = part.fraction;
-            let d_unit = self.unit_stress(&strain);
-            let trial = |E: f64, d_E: f64| -> [f64; N] {
-                array::from_fn(|i| column.stress[i] + E * d_unit[i] + d_E * unit[i])
-            };
-            of.E = stiffening * E_0_slope * d_s_0[2] + stiffening_slope[j] * E_0;
-            of.s = turn_1.normal(&trial(trial_1.E, of.E));
-            of.sin_psi = (at_0[1] + at_0[2]) * d_x_0;
-            let d_s_1 = end_1.rates(system_1.as_ref(), &of, false).s;
-            let d_middle = 0.5 * (d_s_0[2] + d_s_1[2]);
-            of.E = stiffening * E_slope * d_middle + stiffening_slope[j] * E;
-            let moved = turn_2.stress(&trial(trial_2.E, of.E));
-            of.s = [moved[0], moved[1], moved[2]];
-            let d_x_1 = x_1_by_q * (d_s_1[0] - d_s_1[2]) + x_1_by_minor * d_s_1[2];
-            of.sin_psi = over[1] * d_x_0 + over[2] * d_x_1;
-            let end = end_2.rates(system_2.as_ref(), &of, !is_last);
-            let d_size = by_size * self.size_rate(&s_0, &d_s_0);
-            error[j] = (sign * (end.s[worst] - d_s_1[worst]) - d_size) / step.size;
-            let kept: [f64; N] =
-                array::from_fn(|i| if i < 3 { end.s[i] } else { kappa[i] * moved[i] });
-            Point {
-                stress: turn_2.back(&kept),
-                p_p: end.p_p,
-                gamma: end.gamma,
-            }
-        });
-        (Derivative { columns }, error)
+        let d_s_0 = if part.is_first {
+            [Rate::ZERO; 3]
+        } else {
+            step.start.turn().normal(&from.stress)
+        };
+        let d_x_0 = from.gamma * x_0_by_gamma + d_s_0[2] * x_0_by_minor;
+        let trial = |E: f64, d_E: Rate<N>| -> [Rate<N>; N] {
+            array::from_fn(|i| {
+                let mut strain = [0.0; N];
+                strain[i] = part.fraction * E;
+                from.stress[i] + Rate(self.unit_stress(&strain)) + d_E * unit[i]
+            })
+        };
+        let mut of = Rates {
+            s: d_s_0,
+            start: d_s_0,
+            E: d_s_0[2] * (stiffening * E_0_slope) + *stiffening_slope * E_0,
+            sin_psi: d_x_0 * (at_0[1] + at_0[2]),
+            p_p: from.p_p,
+            gamma: from.gamma,
+            slowing: part.increment.slowing_slope,
+        };
+        of.s = turn_1.normal(&trial(stiffening * E_0, of.E));
+        let d_s_1 = end_1.rates(&of, false).s;
+        let d_middle = (d_s_0[2] + d_s_1[2]) * 0.5;
+        of.E = d_middle * (stiffening * E_slope) + *stiffening_slope * E;
+        let mut moved = turn_2.stress(&trial(stiffening * E, of.E));
+        of.s = [moved[0], moved[1], moved[2]];
+        let d_x_1 = (d_s_1[0] - d_s_1[2]) * x_1_by_q + d_s_1[2] * x_1_by_minor;
+        of.sin_psi = d_x_0 * over[1] + d_x_1 * over[2];
+        let end = end_2.rates(&of, !is_last);
+        let d_size = self.size_rate(&s_0, &d_s_0) * by_size;
+        let error = ((end.s[worst] - d_s_1[worst]) * sign - d_size) * (1.0 / step.size);
+        moved[..3].copy_from_slice(&end.s);
+        for (i, rate) in moved.iter_mut().enumerate().skip(3) {
+            *rate = *rate * end_2.kappa(self, &axes_2.values, axes_2.pair(i));
+        }
+        let derivative = Derivative {
+            stress: turn_2.back(&moved),
+            p_p: end.p_p,
+            gamma: end.gamma,
+        };
+        (derivative, error)
     }
 
     /// Carries a point over an increment.
@@ -356,22 +369,11 @@ impl Soil {
         attempts: &mut u32,
     ) -> Option<(Point<N>, Derivative<N>)> {
         *attempts = attempts.checked_sub(1)?;
-        let whole = self.step(&from.0, part);
-        // How far the error is from half the tolerance to all of it.
-        let excess = |s: &Step<N>| (2.0 * s.error / self.tolerance - 1.0).clamp(0.0, 1.0);
-        let weighed = whole.as_ref().filter(|step| excess(step) < 1.0);
-        let weighed = weighed.map(|step| {
-            let (derivative, error) = if part.with_derivative {
-                self.differentiate(step, &from.1, part)
-            } else {
-                (Derivative::ZERO, [0.0; N])
-            };
-            (step.end, derivative, excess(step), error)
-        });
-        if let Some((end, derivative, weight, _)) = weighed
-            && weight <= 0.0
+        let whole = self.step(from, part);
+        if let Some(step) = &whole
+            && step.excess <= 0.0
         {
-            return Some((end, derivative));
+            return Some(step.at);
         }
         let halvings = halvings.checked_sub(1)?;
         let mut half = Part {
@@ -381,7 +383,12 @@ impl Soil {
         let middle = self.advance(from, &half, halvings, attempts)?;
         half.is_first = false;
         let halves = self.advance(&middle, &half, halvings, attempts)?;
-        let Some((end, derivative, excess, error)) = weighed else {
+        let Some(Step {
+            at: (end, derivative),
+            excess,
+            error,
+        }) = whole.filter(|step| step.excess < 1.0)
+        else {
             return Some(halves);
         };
         // Smooth at both ends.
@@ -390,11 +397,12 @@ impl Soil {
         let mut mean = (end.sum(1.0 - weight, weight, &halves.0), Derivative::ZERO);
         if part.with_derivative {
             let change = halves.0.sum(1.0, -1.0, &end);
-            mean.1.columns = array::from_fn(|j| {
-                derivative.columns[j]
-                    .sum(1.0 - weight, weight, &halves.1.columns[j])
-                    .sum(1.0, slope * error[j], &change)
-            });
+            let rate = derivative.sum(1.0 - weight, weight, &halves.1);
+            mean.1 = Derivative {
+                stress: array::from_fn(|i| rate.stress[i] + error * (slope * change.stress[i])),
+                p_p: rate.p_p + error * (slope * change.p_p),
+                gamma: rate.gamma + error * (slope * change.gamma),
+            };
         }
         self.harden(&mut mean.0, &mut mean.1);
         Some(mean)
@@ -405,25 +413,17 @@ impl Soil {
     fn harden<const N: usize>(&self, point: &mut Point<N>, derivative: &mut Derivative<N>) {
         let principal = Principal::of(&point.stress);
         let s = principal.values;
-        let turn = principal.turn();
-        let [shear, _, cap, _] = self.excess(&s, point.p_p, point.gamma);
-        if shear > 0.0 {
+        let rate = principal.turn().normal(&derivative.stress);
+        if self.beyond_shear(&s, point.gamma) > 0.0 {
             let (gamma, by_q, by_minor) = self.gamma(s[0] - s[2], s[2]);
             point.gamma = gamma;
-            for column in &mut derivative.columns {
-                let rate = turn.normal(&column.stress);
-                column.gamma = by_q * (rate[0] - rate[2]) + by_minor * rate[2];
-            }
+            derivative.gamma = (rate[0] - rate[2]) * by_q + rate[2] * by_minor;
         }
-        if cap > 0.0 {
+        if self.beyond_cap(&s, point.p_p) > 0.0 {
             let (q, p) = (self.cap.q(&s), ((s[0] + s[1] + s[2]) / 3.0).max(0.0));
             point.p_p = self.cap.size(q, p);
             let by_q = q / (self.cap.M * self.cap.M * point.p_p);
-            for column in &mut derivative.columns {
-                let rate = turn.normal(&column.stress);
-                let mean = (rate[0] + rate[1] + rate[2]) / 3.0;
-                column.p_p = by_q * self.cap.q(&rate) + p / point.p_p * mean;
-            }
+            derivative.p_p = self.cap.q(&rate) * by_q + mean(&rate) * (p / point.p_p);
         }
     }
 }

@@ -4,26 +4,10 @@
 //! Compression is positive here; Λ is the multiplier of shear, μ that of the cap.
 
 use crate::cap::Hardening;
+use crate::rate::{Linear, Rate, dot, mean, plus, times};
 use crate::return_mapping::{Merged, Shear, Trial, Zone};
 use crate::soil::Soil;
 use std::array;
-
-/// Σ xᵢ yᵢ.
-#[inline]
-pub(crate) fn dot(x: &[f64; 3], y: &[f64; 3]) -> f64 {
-    x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
-}
-
-/// x + factor y.
-#[inline]
-fn plus(x: &[f64; 3], factor: f64, y: &[f64; 3]) -> [f64; 3] {
-    array::from_fn(|i| x[i] + factor * y[i])
-}
-
-#[inline]
-fn mean(x: &[f64; 3]) -> f64 {
-    (x[0] + x[1] + x[2]) / 3.0
-}
 
 /// Stress, multipliers and the derivatives of the conditions at one iterate.
 #[derive(Clone, Copy, Debug)]
@@ -37,12 +21,15 @@ pub(crate) struct Iterate {
     pub(crate) middle: [f64; 2],
     /// ∂s/∂Λ and ∂s/∂μ.
     by_multiplier: [[f64; 3]; 2],
-    /// Derivatives of the conditions by s, and by Λ and μ in all.
-    gradient: [[f64; 3]; 2],
+    /// Derivatives of the conditions by Λ and μ.
     jacobian: [[f64; 2]; 2],
-    /// Derivative of the first condition by γ_ps.
+    /// Derivatives of the first condition by σ₃ and γ_ps; that by σ₁ is 1.
+    by_minor: f64,
     by_gamma: f64,
-    /// Changes of p and q̃ from those that the flow of the cap leaves out of account.
+    /// Derivatives of the second condition by p and q̃.
+    by_pressure: f64,
+    by_shear: f64,
+    /// Changes of `middle` by those of p and q̃ that leave the flow of the cap out of account.
     response: [[f64; 2]; 2],
     /// p_p and its derivatives by the cap's volume strain and by p_p at the start.
     pub(crate) p_p: f64,
@@ -51,26 +38,26 @@ pub(crate) struct Iterate {
 }
 
 /// Rates of what a return depends on, and of its results.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Rates {
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Rates<const N: usize> {
     /// Principal stresses: of the trial stress, then of the end.
-    pub(crate) s: [f64; 3],
+    pub(crate) s: [Rate<N>; 3],
     /// Principal stresses at the start.
-    pub(crate) start: [f64; 3],
+    pub(crate) start: [Rate<N>; 3],
     /// Young's modulus, kPa.
-    pub(crate) E: f64,
+    pub(crate) E: Rate<N>,
     /// sin ψ_m.
-    pub(crate) sin_psi: f64,
-    pub(crate) p_p: f64,
-    pub(crate) gamma: f64,
-    pub(crate) slowing: f64,
+    pub(crate) sin_psi: Rate<N>,
+    pub(crate) p_p: Rate<N>,
+    pub(crate) gamma: Rate<N>,
+    pub(crate) slowing: Rate<N>,
 }
 
 /// A return to known surfaces.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct System<'a> {
     soil: &'a Soil,
-    pub(crate) trial: &'a Trial,
+    pub(crate) trial: Trial,
     pub(crate) zone: Zone,
     /// Gradient of q̃.
     a: [f64; 3],
@@ -80,18 +67,18 @@ pub(crate) struct System<'a> {
     by_shear: [f64; 3],
     by_p: [f64; 3],
     by_q: [f64; 3],
-    /// p and q̃ of these two, p first.
+    /// p and q̃ of `s`, of what Λ takes away, and of the last two, p first.
+    of_s: [f64; 2],
+    of_shear: [f64; 2],
     coupling: [[f64; 2]; 2],
-    /// p and q̃ at the start.
+    /// p and q̃ at the start, by their weight over that of the end.
     start: [f64; 2],
     hardening: Hardening,
 }
 
-const THIRD: [f64; 3] = [1.0 / 3.0; 3];
-
 impl<'a> System<'a> {
     #[inline]
-    pub(crate) fn new(soil: &'a Soil, trial: &'a Trial, zone: Zone, hardening: Hardening) -> Self {
+    pub(crate) fn new(soil: &'a Soil, trial: Trial, zone: Zone, hardening: Hardening) -> Self {
         let a = soil.cap.gradient(
             zone.merged == Merged::First12,
             zone.merged == Merged::Last23,
@@ -105,6 +92,8 @@ impl<'a> System<'a> {
             by_shear: [0.0; 3],
             by_p: [0.0; 3],
             by_q: [0.0; 3],
+            of_s: [0.0; 2],
+            of_shear: [0.0; 2],
             coupling: [[0.0; 2]; 2],
             start: [0.0; 2],
             hardening,
@@ -122,7 +111,11 @@ impl<'a> System<'a> {
     #[inline]
     fn add_cap(&mut self) {
         let Soil { cap, .. } = self.soil;
-        self.start = [mean(&self.trial.start), cap.q(&self.trial.start)];
+        let theta = self.trial.theta;
+        let start = [mean(&self.trial.start), cap.q(&self.trial.start)];
+        self.start = start.map(|x| x * (1.0 - theta) / theta);
+        self.of_s = [mean(&self.s), dot(&self.a, &self.s)];
+        self.of_shear = [mean(&self.by_shear), dot(&self.a, &self.by_shear)];
         let factor = 2.0 / (cap.M * cap.M);
         if !self.zone.cylinder {
             self.by_p = self.elastic(&[2.0 / 3.0; 3]);
@@ -173,34 +166,35 @@ impl<'a> System<'a> {
 
     /// Difference of plastic strains that makes stresses equal.
     #[inline]
-    fn apart(&self, difference: f64) -> f64 {
-        difference / (2.0 * self.soil.G * self.trial.E)
+    fn apart<T: Linear>(&self, difference: T) -> T {
+        difference * (0.5 / (self.soil.G * self.trial.E))
     }
 
     /// The mean of merged stresses, and what the cut-off makes of them, Eq. (16).
     #[inline]
-    fn condensed(&self, s: &[f64; 3], R_t: f64) -> [f64; 3] {
+    fn condensed<T: Linear>(&self, s: &[T; 3], R_t: T) -> [T; 3] {
         let nu = self.soil.nu;
         let [mut s1, mut s2, mut s3] = *s;
         match self.zone.merged {
             Merged::None => {}
             Merged::First12 => {
-                s1 = 0.5 * (s1 + s2);
+                s1 = (s1 + s2) * 0.5;
                 s2 = s1;
             }
             Merged::Last23 => {
-                s2 = 0.5 * (s2 + s3);
+                s2 = (s2 + s3) * 0.5;
                 s3 = s2;
             }
         }
         if !self.zone.tension {
             return [s1, s2, s3];
         }
+        let least = R_t * -1.0;
         if self.zone.merged == Merged::Last23 {
-            return [s1 - 2.0 * nu * (s3 + R_t), -R_t, -R_t];
+            return [s1 - (s3 + R_t) * (2.0 * nu), least, least];
         }
-        let change = nu / (1.0 - nu) * (s3 + R_t);
-        [s1 - change, s2 - change, -R_t]
+        let change = (s3 + R_t) * (nu / (1.0 - nu));
+        [s1 - change, s2 - change, least]
     }
 
     /// Stress of a strain; at the cut-off the stress that it does not take away, Eq. (16).
@@ -223,99 +217,100 @@ impl<'a> System<'a> {
         ]
     }
 
-    /// The p and q̃ that follow direct changes of them, since the cap's flow depends on the stress.
+    /// [`Iterate::response`]: the inverse of two linear equations, since the cap's flow depends on the stress.
     #[inline]
-    fn response(&self, w: f64) -> [[f64; 2]; 2] {
+    fn response(&self, mu: f64) -> [[f64; 2]; 2] {
+        let theta = self.trial.theta;
+        let w = mu * theta;
         let [[pp, pq], [qp, qq]] = self.coupling;
         let (pp, pq, qp, qq) = (1.0 + w * pp, w * pq, w * qp, 1.0 + w * qq);
-        let scale = w / (pp * qq - pq * qp);
+        let scale = theta / (pp * qq - pq * qp);
         [[qq * scale, -pq * scale], [-qp * scale, pp * scale]]
     }
 
-    /// The change of stress that follows a direct change.
+    /// What the cap's flow along p and q̃ takes away.
     #[inline]
-    fn respond(&self, direct: &[f64; 3], [[pp, pq], [qp, qq]]: &[[f64; 2]; 2]) -> [f64; 3] {
-        let (p, q) = (mean(direct), dot(&self.a, direct));
-        let (p, q) = (pp * p + pq * q, qp * p + qq * q);
-        array::from_fn(|i| direct[i] - p * self.by_p[i] - q * self.by_q[i])
+    fn taken<T: Linear>(&self, [p, q]: [T; 2]) -> [T; 3] {
+        array::from_fn(|i| p * self.by_p[i] + q * self.by_q[i])
     }
 
     /// Stress, conditions and their derivatives.
     #[inline]
     pub(crate) fn at(&self, multipliers: [f64; 2]) -> Iterate {
-        let [Lambda, mu] = multipliers;
-        let (soil, theta) = (self.soil, self.trial.theta);
         let mut end = Iterate {
-            s: plus(&self.s, -Lambda, &self.by_shear),
+            s: plus(&self.s, -multipliers[0], &self.by_shear),
             multipliers,
             residual: [0.0; 2],
             middle: [0.0; 2],
             by_multiplier: [self.by_shear.map(|x| -x), [0.0; 3]],
-            gradient: [[0.0; 3]; 2],
             jacobian: [[1.0, 0.0], [0.0, 1.0]],
+            by_minor: 0.0,
             by_gamma: 0.0,
+            by_pressure: 0.0,
+            by_shear: 0.0,
             response: [[0.0; 2]; 2],
             p_p: self.trial.p_p,
             by_strain: 0.0,
             by_start: 1.0,
         };
         if self.zone.cap {
-            end.response = self.response(mu * theta);
-            let [p_0, q_0] = self.start.map(|x| mu * (1.0 - theta) * x);
-            let direct: [f64; 3] =
-                array::from_fn(|i| end.s[i] - p_0 * self.by_p[i] - q_0 * self.by_q[i]);
-            end.s = self.respond(&direct, &end.response);
-            end.middle = self.middle(&end.s);
-            let [p, q] = end.middle;
-            let flow = array::from_fn(|i| -p * self.by_p[i] - q * self.by_q[i]);
-            end.by_multiplier = [
-                self.respond(&end.by_multiplier[0], &end.response),
-                self.respond(&flow, &end.response),
-            ];
+            self.flow_along_cap(&mut end);
         }
-        let s = end.s;
         if self.zone.shear != Shear::None {
-            let [growth, weight, ..] = self.growth(Lambda);
-            let (q, by_minor);
-            if self.zone.shear == Shear::Hardening {
-                let on = soil.hyperbola(self.trial.gamma + growth, s[2]);
-                (q, by_minor) = (on.q, on.by_minor);
-                end.by_gamma = -on.by_gamma;
-            } else {
-                (q, by_minor) = soil.q_f(s[2]);
-            }
-            end.residual[0] = s[0] - s[2] - q;
-            end.gradient[0] = [1.0, 0.0, -1.0 - by_minor];
-            end.jacobian[0] = [
-                dot(&end.gradient[0], &end.by_multiplier[0]) + end.by_gamma * weight,
-                dot(&end.gradient[0], &end.by_multiplier[1]),
-            ];
-        }
-        if self.zone.cap {
-            let M = soil.cap.M;
-            let (p, q) = (mean(&s), dot(&self.a, &s));
-            let size = soil.cap.size(q, p);
-            let pressure = if self.zone.cylinder {
-                0.0
-            } else {
-                end.middle[0]
-            };
-            let mut hardened = self.hardening.after(2.0 * mu * pressure);
-            if self.zone.cylinder {
-                hardened.by_strain = 0.0;
-            }
-            (end.p_p, end.by_strain, end.by_start) =
-                (hardened.p_p, hardened.by_strain, hardened.by_start);
-            end.residual[1] = size - hardened.p_p;
-            let by_p = p.max(0.0) / size - hardened.by_strain * 2.0 * mu * theta;
-            let by_q = q / (M * M * size);
-            end.gradient[1] = plus(&THIRD.map(|x| x * by_p), by_q, &self.a);
-            end.jacobian[1] = [
-                dot(&end.gradient[1], &end.by_multiplier[0]),
-                dot(&end.gradient[1], &end.by_multiplier[1]) - hardened.by_strain * 2.0 * pressure,
-            ];
+            self.limit_shear(&mut end);
         }
         end
+    }
+
+    /// Stress after the cap's flow, and the second condition.
+    #[inline]
+    fn flow_along_cap(&self, end: &mut Iterate) {
+        let ([Lambda, mu], theta, M) = (end.multipliers, self.trial.theta, self.soil.cap.M);
+        end.response = self.response(mu);
+        let direct = array::from_fn(|i| self.start[i] + self.of_s[i] - Lambda * self.of_shear[i]);
+        end.middle = times(&end.response, direct);
+        let by_Lambda = times(&end.response, self.of_shear).map(|x| -x);
+        let by_mu = times(&end.response, times(&self.coupling, end.middle)).map(|x| -x);
+        let flow = self.taken(end.middle);
+        end.s = plus(&end.s, -mu, &flow);
+        let [by_1, by_2] = &mut end.by_multiplier;
+        *by_1 = plus(by_1, -mu, &self.taken(by_Lambda));
+        *by_2 = plus(&flow.map(|x| -x), -mu, &self.taken(by_mu));
+        let [p, q] = array::from_fn(|i| end.middle[i] / theta - self.start[i]);
+        let size = self.soil.cap.size(q, p);
+        let mut hardened;
+        if self.zone.cylinder {
+            hardened = self.hardening.after(0.0);
+            hardened.by_strain = 0.0;
+        } else {
+            hardened = self.hardening.after(2.0 * mu * end.middle[0]);
+        }
+        (end.p_p, end.by_strain, end.by_start) =
+            (hardened.p_p, hardened.by_strain, hardened.by_start);
+        end.residual[1] = size - hardened.p_p;
+        end.by_pressure = p.max(0.0) / size - hardened.by_strain * 2.0 * mu * theta;
+        end.by_shear = q / (M * M * size);
+        end.jacobian[1] = [by_Lambda, by_mu]
+            .map(|[by_p, by_q]| (end.by_pressure * by_p + end.by_shear * by_q) / theta);
+        end.jacobian[1][1] -= hardened.by_strain * 2.0 * end.middle[0];
+    }
+
+    /// The first condition.
+    #[inline]
+    fn limit_shear(&self, end: &mut Iterate) {
+        let [growth, weight, ..] = self.growth(end.multipliers[0]);
+        let (q, by_minor);
+        if self.zone.shear == Shear::Hardening {
+            let on = self.soil.hyperbola(self.trial.gamma + growth, end.s[2]);
+            (q, by_minor) = (on.q, on.by_minor);
+            end.by_gamma = -on.by_gamma;
+        } else {
+            (q, by_minor) = self.soil.q_f(end.s[2]);
+        }
+        end.residual[0] = end.s[0] - end.s[2] - q;
+        end.by_minor = -1.0 - by_minor;
+        end.jacobian[0] = end.by_multiplier.map(|by| by[0] + end.by_minor * by[2]);
+        end.jacobian[0][0] += end.by_gamma * weight;
     }
 
     /// The iterate after a small change of the multipliers; its derivatives stay.
@@ -336,12 +331,8 @@ impl<'a> System<'a> {
     /// p and q̃ that the cap's flow follows.
     #[inline]
     fn middle(&self, s: &[f64; 3]) -> [f64; 2] {
-        let theta = self.trial.theta;
-        let [p_0, q_0] = self.start;
-        [
-            (1.0 - theta) * p_0 + theta * mean(s),
-            (1.0 - theta) * q_0 + theta * dot(&self.a, s),
-        ]
+        let of_s = [mean(s), dot(&self.a, s)];
+        array::from_fn(|i| self.trial.theta * (self.start[i] + of_s[i]))
     }
 
     /// Whether the cut-off has to hold the stress back at this end.
@@ -387,79 +378,68 @@ impl<'a> System<'a> {
         gap <= 2.0 * self.soil.G * self.trial.E * closing
     }
 
-    /// Rates of stress, p_p and γ_ps at the end; E, sin ψ_m and `start` of the result are unused.
+    /// Rates of stress, p_p and γ_ps at the end; the others of the result are those of the start.
     #[inline]
-    pub(crate) fn rates(&self, end: &Iterate, of: &Rates, with_variables: bool) -> Rates {
+    pub(crate) fn rates<const N: usize>(
+        &self,
+        end: &Iterate,
+        of: &Rates<N>,
+        with_variables: bool,
+    ) -> Rates<N> {
         let [Lambda, mu] = end.multipliers;
         let theta = self.trial.theta;
         let old = 1.0 - theta;
-        let mut direct = self.condensed(&of.s, 0.0);
-        let by_E = of.E / self.trial.E;
-        direct = plus(&direct, -Lambda * by_E, &self.by_shear);
-        let u = if self.zone.shear == Shear::Hardening {
-            of.sin_psi
-        } else {
-            0.0
-        };
-        if u != 0.0 {
-            let zero = self.flow(0.0);
-            let turn: [f64; 3] = array::from_fn(|i| self.flow(1.0)[i] - zero[i]);
-            direct = plus(&direct, -Lambda * u, &self.elastic(&turn));
+        let by_E = of.E * (1.0 / self.trial.E);
+        let mut direct = self.condensed(&of.s, Rate::ZERO);
+        direct = plus(&direct, by_E * -Lambda, &self.by_shear);
+        let mut u = Rate::ZERO;
+        if self.zone.shear == Shear::Hardening {
+            u = of.sin_psi;
+            let (zero, one) = (self.flow(0.0), self.flow(1.0));
+            let turned = self.elastic(&array::from_fn(|i| one[i] - zero[i]));
+            direct = plus(&direct, u * -Lambda, &turned);
         }
         let (p_0, q_0) = (mean(&of.start), self.soil.cap.q(&of.start));
         if self.zone.cap {
-            direct = plus(
-                &direct,
-                -mu * (by_E * end.middle[0] + old * p_0),
-                &self.by_p,
-            );
-            direct = plus(
-                &direct,
-                -mu * (by_E * end.middle[1] + old * q_0),
-                &self.by_q,
-            );
+            let [p, q] = end.middle.map(|x| by_E * (-mu * x));
+            direct = plus(&direct, p - p_0 * (mu * old), &self.by_p);
+            direct = plus(&direct, q - q_0 * (mu * old), &self.by_q);
         }
-        let fixed = self.respond(&direct, &end.response);
+        let follow = times(&end.response, [mean(&direct), dot(&self.a, &direct)]);
+        let taken = self.taken(follow);
+        let fixed = array::from_fn(|i| direct[i] - taken[i] * mu);
         let [growth, weight, by_u, by_apart] = self.growth(Lambda);
         let difference = self.trial.s[0] - self.trial.s[1];
         let apart = self.apart(of.s[0] - of.s[1] - by_E * difference);
-        let gamma =
-            of.gamma + by_u * u + by_apart * apart + growth / self.trial.slowing * of.slowing;
-        let mut change = [0.0; 2];
+        let slowed = of.slowing * (growth / self.trial.slowing);
+        let gamma = of.gamma + u * by_u + apart * by_apart + slowed;
+        let mut change = [Rate::ZERO; 2];
         if self.zone.shear != Shear::None {
-            change[0] = dot(&end.gradient[0], &fixed) + end.by_gamma * gamma;
+            change[0] = fixed[0] + fixed[2] * end.by_minor + gamma * end.by_gamma;
         }
         if self.zone.cap {
-            change[1] = dot(&end.gradient[1], &fixed)
-                - end.by_start * of.p_p
-                - end.by_strain * 2.0 * mu * old * p_0;
+            let volume = p_0 * (end.by_strain * 2.0 * mu * old);
+            let moved = mean(&fixed) * end.by_pressure + dot(&self.a, &fixed) * end.by_shear;
+            change[1] = moved - of.p_p * end.by_start - volume;
         }
         let [d_Lambda, d_mu] = end.correction(&change);
-        let s = plus(
-            &plus(&fixed, d_Lambda, &end.by_multiplier[0]),
-            d_mu,
-            &end.by_multiplier[1],
-        );
-        let mut rates = Rates {
-            s,
-            p_p: of.p_p,
-            gamma: of.gamma,
-            ..Rates::default()
-        };
+        let [by_Lambda, by_mu] = &end.by_multiplier;
+        let s = plus(&plus(&fixed, d_Lambda, by_Lambda), d_mu, by_mu);
+        let mut rates = Rates { s, ..*of };
         if !with_variables {
             return rates;
         }
         if self.zone.cap {
-            let volume = d_mu * end.middle[0] + mu * (theta * mean(&s) + old * p_0);
-            rates.p_p = end.by_start * of.p_p + end.by_strain * 2.0 * volume;
+            let volume = d_mu * end.middle[0] + (mean(&s) * theta + p_0 * old) * mu;
+            rates.p_p = of.p_p * end.by_start + volume * (2.0 * end.by_strain);
         }
         match self.zone.shear {
             Shear::None => {}
-            Shear::Hardening => rates.gamma = gamma + weight * d_Lambda,
+            Shear::Hardening => rates.gamma = gamma + d_Lambda * weight,
             Shear::Limit => {
                 let (reached, by_q, by_minor) = self.soil.gamma(end.s[0] - end.s[2], end.s[2]);
                 if reached > self.trial.gamma {
-                    rates.gamma = by_q * (s[0] - s[2]) + by_minor * s[2];
+                    rates.gamma = (s[0] - s[2]) * by_q + s[2] * by_minor;
                 }
             }
         }
@@ -470,9 +450,12 @@ impl<'a> System<'a> {
 impl Iterate {
     /// −J⁻¹ x.
     #[inline]
-    pub(crate) fn correction(&self, x: &[f64; 2]) -> [f64; 2] {
+    pub(crate) fn correction<T: Linear>(&self, x: &[T; 2]) -> [T; 2] {
         let [[a, b], [c, d]] = self.jacobian;
         let scale = -1.0 / (a * d - b * c);
-        [(d * x[0] - b * x[1]) * scale, (a * x[1] - c * x[0]) * scale]
+        [
+            x[0] * (d * scale) - x[1] * (b * scale),
+            x[1] * (a * scale) - x[0] * (c * scale),
+        ]
     }
 }
