@@ -511,6 +511,10 @@ mod tests {
         solver.factorise(vec![4.0, 1.0, 2.0, 3.0]).unwrap();
         let x = solver.solve(&[8.0, 7.0]).unwrap();
         assert!((x[0] - 1.0).abs() < 1e-15 && (x[1] - 2.0).abs() < 1e-15);
+        let last = solver.set_aside().unwrap();
+        solver.factorise(vec![1.0, 0.0, 0.0, 1.0]).unwrap();
+        solver.put_back(last, true).unwrap();
+        assert_eq!(solver.solve(&[8.0, 7.0]).unwrap(), x);
     }
 
     #[test]
@@ -538,6 +542,9 @@ mod tests {
         solver.factorise(values).unwrap();
         let x = solver.solve(&vec![1.0; n]).unwrap();
         assert!(x.iter().all(|x| (x - 0.5).abs() < 1e-15));
+        let last = solver.set_aside().unwrap();
+        solver.put_back(last, true).unwrap();
+        assert_eq!(solver.solve(&vec![1.0; n]).unwrap(), x);
     }
 
     /// Solves with a block of two equations, the Schur complement of [[4, 1, 1], [1, 3, 0],
