@@ -19,7 +19,7 @@ mod product;
 pub mod threads;
 
 pub use dense::{Factors, largest};
-pub use linear::{Block, Dense, LinearSolver, Singular};
+pub use linear::{Block, Dense, LastMatrix, LinearSolver, Singular};
 pub use multifrontal::{Gathered, Kind, Multifrontal};
 pub use order::mesh_lines;
 pub use pattern::Pattern;

@@ -118,6 +118,16 @@ struct RowExchanges {
     factors: Option<Lu<u32, f64>>,
 }
 
+/// The last matrix of a [`LinearSolver`], which is to be there again after others.
+#[derive(Debug)]
+pub struct LastMatrix {
+    values: Vec<f64>,
+    factorised: bool,
+    proven: bool,
+    /// Factorisations and fallbacks so far.
+    counts: [u64; 2],
+}
+
 /// The matrix is singular, or so close to it that a solution would be noise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Singular;
@@ -271,6 +281,36 @@ impl LinearSolver {
         }
     }
 
+    /// The last matrix, for [`Self::put_back`] once others, which need not be symmetric, have been factorised in its
+    /// place: two factorisations at a time take twice the memory. `None` if they need [another](Self::another) solver.
+    pub fn set_aside(&self) -> Option<LastMatrix> {
+        (!self.multifrontal.is_symmetric()).then(|| LastMatrix {
+            values: self.values.clone(),
+            factorised: self.factorised,
+            proven: self.proven,
+            counts: [self.factorisations, self.fallbacks],
+        })
+    }
+
+    /// Factorises a matrix that was set aside once more, to the same bits, if it is still `wanted`. Nothing since then
+    /// is counted.
+    ///
+    /// # Errors
+    /// [`Singular`].
+    pub fn put_back(&mut self, last: LastMatrix, wanted: bool) -> Result<(), Singular> {
+        let outcome = match wanted {
+            false => Ok(()),
+            true if last.factorised => self.factorise(last.values),
+            true => {
+                self.values = last.values;
+                self.fall_back()
+            }
+        };
+        self.proven = wanted && last.proven;
+        [self.factorisations, self.fallbacks] = last.counts;
+        outcome
+    }
+
     /// Lets the next solution be checked, whatever the last ones were like.
     pub fn check_next(&mut self) {
         self.proven = false;
@@ -297,6 +337,7 @@ impl LinearSolver {
     fn fall_back(&mut self) -> Result<(), Singular> {
         self.factorised = false;
         self.fallbacks += 1;
+        self.multifrontal.forget();
         let (pattern, values) = self.with_block_entries();
         let other = match &mut self.row_exchanges {
             Some(other) => other,
@@ -470,6 +511,10 @@ mod tests {
         solver.factorise(vec![4.0, 1.0, 2.0, 3.0]).unwrap();
         let x = solver.solve(&[8.0, 7.0]).unwrap();
         assert!((x[0] - 1.0).abs() < 1e-15 && (x[1] - 2.0).abs() < 1e-15);
+        let last = solver.set_aside().unwrap();
+        solver.factorise(vec![1.0, 0.0, 0.0, 1.0]).unwrap();
+        solver.put_back(last, true).unwrap();
+        assert_eq!(solver.solve(&[8.0, 7.0]).unwrap(), x);
     }
 
     #[test]
@@ -497,6 +542,9 @@ mod tests {
         solver.factorise(values).unwrap();
         let x = solver.solve(&vec![1.0; n]).unwrap();
         assert!(x.iter().all(|x| (x - 0.5).abs() < 1e-15));
+        let last = solver.set_aside().unwrap();
+        solver.put_back(last, true).unwrap();
+        assert_eq!(solver.solve(&vec![1.0; n]).unwrap(), x);
     }
 
     /// Solves with a block of two equations, the Schur complement of [[4, 1, 1], [1, 3, 0],

@@ -125,6 +125,13 @@ impl Multifrontal {
         self.others_follow = true;
     }
 
+    /// Gives up all factors.
+    pub(crate) fn forget(&mut self) {
+        self.is_complete = false;
+        self.memory = Mutex::default();
+        self.fronts.fill_with(Mutex::default);
+    }
+
     /// Bytes that a factorisation takes, by the analysis, and what is kept for other matrices.
     pub fn bytes(&self) -> u64 {
         let kept = if self.others_follow {

@@ -8,7 +8,7 @@
 use super::phase::PhaseEquations;
 use super::{Simulation, UnderWay, Warning, Watch};
 use crate::assembly::fold;
-use crate::equilibrium::{Costs, Equations, Matrix, Newton, StepSuccess, norm};
+use crate::equilibrium::{Costs, Equations, Newton, StepSuccess, norm};
 use crate::error::Place;
 use crate::group::{Aside, Group};
 use crate::settings::{Control, Settings};
@@ -87,17 +87,12 @@ impl Simulation {
     /// stopped.
     fn neighbour(
         &mut self,
-        phase: &UnderWay,
+        phase: &mut UnderWay,
         success: &StepSuccess,
         [from, to]: [f64; 2],
         trial: Trial,
     ) -> Option<Neighbour> {
-        let equations = &phase.equations;
-        let mut solver = equations.solver.another().ok()?;
-        solver.expect_others();
-        let bytes = solver.bytes() + equations.system.bytes_of_elements(&self.groups);
-        self.reuse
-            .announce(bytes, "factorising the equations once more");
+        let equations = &mut phase.equations;
         let before = self.forces(equations, Group::add_carried);
         let here = self.forces(equations, Group::add_trial_forces);
         let aside: Vec<Aside> = self.groups.iter_mut().map(Group::put_aside).collect();
@@ -113,14 +108,19 @@ impl Simulation {
                 ..self.settings()
             },
         };
-        let mut matrix = Matrix::resumed(equations.matrix.largest());
+        let last = equations.solver.set_aside();
+        let mut another = match last {
+            Some(_) => None,
+            None => Some(equations.solver.another().ok()?),
+        };
+        let mut matrix = equations.matrix.lend();
         let mut costs = Costs::default();
         let clock = self.clock(phase.number);
         let equations_of_trial = Equations {
             system: &equations.system,
             places: &equations.places,
             domain: equations.domain.as_ref(),
-            solver: &mut solver,
+            solver: another.as_mut().unwrap_or(&mut equations.solver),
             matrix: &mut matrix,
         };
         let mut newton = Newton::new(equations_of_trial, &mut self.groups, &settings, &mut costs)
@@ -149,6 +149,12 @@ impl Simulation {
         for (group, aside) in self.groups.iter_mut().zip(aside) {
             group.take_back(aside);
         }
+        let PhaseEquations {
+            matrix: own,
+            solver,
+            ..
+        } = equations;
+        own.put_back(matrix, solver, last);
         neighbour
     }
 

@@ -6,7 +6,7 @@ use super::residual::Balance;
 use crate::assembly::{Elements, System};
 use crate::group::Group;
 use crate::settings::Method;
-use algebra::{LinearSolver, Singular, largest, threads};
+use algebra::{LastMatrix, LinearSolver, Singular, largest, threads};
 use law::Operator;
 use std::time::Instant;
 
@@ -90,6 +90,36 @@ impl Matrix {
     pub(super) fn largest_of(&self, body: usize) -> f64 {
         let known = self.largest_by_body.get(body);
         known.copied().unwrap_or(self.largest)
+    }
+
+    /// A matrix that starts from what this one has kept of the elements, until [`Self::put_back`].
+    #[must_use]
+    pub fn lend(&mut self) -> Self {
+        Self {
+            elements: std::mem::take(&mut self.elements),
+            ..Self::resumed(self.largest)
+        }
+    }
+
+    /// Takes that back. The solver, with which others were factorised, gets its last matrix again if the next step
+    /// begins with it.
+    pub fn put_back(&mut self, lent: Self, solver: &mut LinearSolver, last: Option<LastMatrix>) {
+        self.elements = lent.elements;
+        let wanted = self.held && self.has_tangents;
+        self.restore(solver, last, wanted);
+    }
+
+    /// Factorises the last matrix of the solver again, if there were others and it is still `wanted`.
+    pub(super) fn restore(
+        &mut self,
+        solver: &mut LinearSolver,
+        last: Option<LastMatrix>,
+        wanted: bool,
+    ) {
+        if let Some(last) = last {
+            self.held = solver.put_back(last, wanted).is_ok() && wanted;
+            self.sum = Sum::Another;
+        }
     }
 
     pub(super) fn hold(&mut self) {

@@ -5,18 +5,28 @@
 //! elastic response is computed once. It uses the factors of the iterations if these are elastic, else separate
 //! equations, so that the matrix stays unchanged.
 
-use super::Newton;
 use super::acceptance::{Change, Forces, MOVES};
 use super::failure::{Runaway, Singularity};
 use super::residual::Task;
+use super::{Equations, Newton};
 use crate::assembly::norms;
 use crate::group::Group;
-use algebra::{LinearSolver, Singular};
+use algebra::{LastMatrix, LinearSolver, Singular};
 use law::Operator;
 use std::collections::BTreeSet;
 
-/// Most bytes of a factorisation that is kept besides that of the iterations.
-const MOST_BESIDE: u64 = 1 << 28;
+/// Most bytes of a factorisation beside that of the iterations.
+const MOST_BESIDE: u64 = 1 << 26;
+
+/// The equations that the tangents at the start of a step are factorised in.
+enum AtStart {
+    /// Those of the iterations, which hold this matrix.
+    Held,
+    /// Those of the iterations, in place of this matrix.
+    Instead(LastMatrix),
+    /// Separate ones, so that the matrix of the iterations stays.
+    Beside(Box<LinearSolver>),
+}
 
 /// References of the present step, and how its last iterate compares with them; by body.
 #[derive(Debug, Default)]
@@ -271,7 +281,7 @@ impl Newton<'_> {
     }
 
     fn answer(&mut self, operator: Operator, task: &Task) -> Option<Elastic> {
-        let (solver, mut internal) = self.factorise_at_start(operator, task.period).ok()?;
+        let (by, mut internal) = self.factorise_at_start(operator, task.period).ok()?;
         if self.equations.domain.is_some() {
             for (&place, force) in self
                 .equations
@@ -296,7 +306,7 @@ impl Newton<'_> {
         let right: Vec<f64> = free
             .map(|(&place, coupling)| task.external[place] - internal[place] - coupling)
             .collect();
-        let solution = self.solve_at_start(solver, &right).ok()?;
+        let solution = self.solve_at_start(by, &right).ok()?;
         let mut increment = task.prescribed.clone();
         for (&place, value) in self.equations.places.free.iter().zip(solution) {
             increment[place] = value;
@@ -322,59 +332,67 @@ impl Newton<'_> {
         })
     }
 
-    /// Factorises the tangents at the start of a step in addition to the matrix that is held: the equations, if that
-    /// one is another, and the internal forces there.
+    /// Factorises the tangents at the start of a step: by which equations, and the internal forces there.
     fn factorise_at_start(
         &mut self,
         operator: Operator,
         period: (f64, f64),
-    ) -> Result<(Option<LinearSolver>, Vec<f64>), Singularity> {
+    ) -> Result<(AtStart, Vec<f64>), Singularity> {
         self.room.displacement.fill(0.0);
         let outcome = self.evaluate_groups(period, operator);
         let mut internal = self.equations.places.take(&mut self.room.force);
         outcome.map_err(|_| Singularity::Unknown)?;
         self.equations.places.fold(&mut internal);
-        if self
-            .equations
-            .matrix
-            .is_of_tangents(self.equations.system, self.groups)
-        {
-            return Ok((None, internal));
+        let Equations {
+            system,
+            solver,
+            matrix,
+            ..
+        } = &mut self.equations;
+        if matrix.is_of_tangents(system, self.groups) {
+            return Ok((AtStart::Held, internal));
         }
-        let mut solver = if let Some(solver) = self.equations.matrix.beside.take() {
+        let is_large = solver.bytes() > MOST_BESIDE;
+        let mut values = solver.room();
+        system.assemble(self.groups, &mut values);
+        if let Some(last) = is_large.then(|| solver.set_aside()).flatten() {
+            if solver.factorise(values).is_err() {
+                matrix.restore(solver, Some(last), matrix.held);
+                return Err(Singularity::Free);
+            }
+            return Ok((AtStart::Instead(last), internal));
+        }
+        let mut beside = if let Some(solver) = matrix.beside.take() {
             solver
         } else {
-            let solver = self
-                .equations
-                .solver
-                .another()
-                .map_err(|_| Singularity::Free)?;
-            self.equations.matrix.announce_beside(solver.bytes());
-            solver
+            let other = solver.another().map_err(|_| Singularity::Free)?;
+            matrix.announce_beside(other.bytes());
+            other
         };
-        let mut values = solver.room();
-        self.equations.system.assemble(self.groups, &mut values);
-        let outcome = solver.factorise(values);
+        let outcome = beside.factorise(values);
         outcome.map_err(|_| Singularity::Free)?;
-        Ok((Some(solver), internal))
+        Ok((AtStart::Beside(Box::new(beside)), internal))
     }
 
-    /// Solves with the equations that [`Self::factorise_at_start`] gave. Keeps the separate
-    /// equations for the next time, if they are not large. If the equations of the iterations need
-    /// full row exchanges for it, they keep them from then on.
-    fn solve_at_start(
-        &mut self,
-        beside: Option<LinearSolver>,
-        right: &[f64],
-    ) -> Result<Vec<f64>, Singular> {
-        let Some(mut solver) = beside else {
-            return self.equations.solver.solve(right);
-        };
-        let solution = solver.solve(right);
-        if solver.bytes() <= MOST_BESIDE && !solver.has_fallen_back() {
-            self.equations.matrix.beside = Some(solver);
+    /// Solves with the equations that [`Self::factorise_at_start`] gave. Keeps separate equations for the next time.
+    /// If the equations of the iterations need full row exchanges for it, they keep them from then on.
+    fn solve_at_start(&mut self, by: AtStart, right: &[f64]) -> Result<Vec<f64>, Singular> {
+        let Equations { solver, matrix, .. } = &mut self.equations;
+        match by {
+            AtStart::Held => solver.solve(right),
+            AtStart::Instead(last) => {
+                let solution = solver.solve(right);
+                matrix.restore(solver, Some(last), matrix.held);
+                solution
+            }
+            AtStart::Beside(mut beside) => {
+                let solution = beside.solve(right);
+                if beside.bytes() <= MOST_BESIDE && !beside.has_fallen_back() {
+                    matrix.beside = Some(*beside);
+                }
+                solution
+            }
         }
-        solution
     }
 
     /// Whether the model with a singular tangent matrix is held elastically, at the start of the
@@ -382,9 +400,9 @@ impl Newton<'_> {
     pub(super) fn singularity(&mut self, period: (f64, f64)) -> Singularity {
         match self.factorise_at_start(Operator::Elastic, period) {
             Err(singularity) => singularity,
-            Ok((solver, _)) => {
+            Ok((by, _)) => {
                 let right = vec![1.0; self.equations.places.free.len()];
-                if self.solve_at_start(solver, &right).is_ok() {
+                if self.solve_at_start(by, &right).is_ok() {
                     Singularity::Limit
                 } else {
                     Singularity::Free
