@@ -142,6 +142,13 @@ impl Observer for Progress {
             Err(why) => format!("pile: no resistance at 10 % of the diameter: {why}"),
         };
         let _ = writeln!(supervision::stdout(), "{line}");
+        if let Ok(found) = &resistances.uplift_ten_percent {
+            let head = tenths(found.head);
+            let _ = writeln!(
+                supervision::stdout(),
+                "pile: uplift resistance at 10 % of the diameter {head:.1} {unit}"
+            );
+        }
     }
 
     fn stop(&self) -> Stop {

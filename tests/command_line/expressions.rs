@@ -154,7 +154,39 @@ fn refuses_expressions_that_have_no_value() {
             (
                 "no number",
                 &[("cohesion = 10.0", "cohesion = ^\"= sqrt(-1)\"")],
-                &["`joint.cohesion`: the expression gives NaN, no number"],
+                &["`joint.cohesion`: the expression gives NaN, no number: `sqrt(-1)` is none"],
+            ),
+            (
+                "the natural logarithm",
+                &[("cohesion = 10.0", "cohesion = ^\"= ln(2)\"")],
+                &["no function `ln`", "`log`"],
+            ),
+            (
+                "a name alone",
+                &[("cohesion = 10.0", "cohesion = ^\"= 2 * poisson_ratio\"")],
+                &["`poisson_ratio` lacks its law: `soil.poisson_ratio`"],
+            ),
+            (
+                "a hyphen",
+                &[
+                    ("[laws.soil]", "[laws.stiff-soil]"),
+                    ("law = \"soil\"", "law = \"stiff-soil\""),
+                    (
+                        "cohesion = 10.0",
+                        "cohesion = ^\"= 2 * stiff-soil.young_modulus\"",
+                    ),
+                ],
+                &["did you mean `\"stiff-soil\".young_modulus`?"],
+            ),
+            (
+                "no sign of equality",
+                &[("cohesion = 10.0", "cohesion = ^\"2*3\"")],
+                &["expected a number", "an expression begins with `=`"],
+            ),
+            (
+                "a typographic minus",
+                &[("cohesion = 10.0", "cohesion = ^\"= 3 − 2\"")],
+                &["`−` is a typographic minus: write `-`"],
             ),
             (
                 "not closed",

@@ -569,9 +569,17 @@ fn a_dry_run_asks_the_laws_for_their_strength() {
             .replacen(ground, sand, 1)
             .replace("k_0 = 0.5", &format!("k_0 = {k_0}"));
         place.write("pile.toml", text);
-        let outcome = place.run(&["run", "pile.toml", "--out", "out", "--dry-run"]);
+        let mut arguments = vec!["run", "pile.toml", "--out", "out"];
+        if code == DONE {
+            arguments.push("--dry-run");
+        }
+        let outcome = place.run(&arguments);
         assert_eq!(outcome.code, Some(code), "{k_0}: {}", outcome.stderr);
         if code == BAD_INPUT {
+            arguments.push("--dry-run");
+            assert_eq!(place.run(&arguments).stderr, outcome.stderr);
+            // The run has found it before it wrote anything.
+            assert_eq!(place.contents(), ["pile.toml"]);
             assert!(
                 outcome.says("outside the strength of law"),
                 "{}",

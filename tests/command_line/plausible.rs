@@ -542,3 +542,18 @@ fn choices_of_the_solver_without_effect_are_said_with_their_line() {
     let said = warnings(&[("[solver]", newton)]);
     assert!(!said.iter().any(|w| w.contains("no effect")), "{said:?}");
 }
+
+#[test]
+fn weights_that_a_phase_gives_to_ground_are_told() {
+    const GROUND: Edit = (
+        "law = \"soil\"",
+        "law = \"soil\"\nunit_weight = 18.0\ninitial_stress = { k_0 = 0.5 }",
+    );
+    for (given, value) in [
+        ("unit_weight = { soil = 40.0 }", "40"),
+        ("unit_weight = { soil = 3.0 }", "3"),
+    ] {
+        let told = format!("phase `push`: `unit_weight` of group `soil` is {value} kN/m³");
+        warns(&[GROUND, (PUSH, given)], &[&told, "ground has 5 to 30"]);
+    }
+}

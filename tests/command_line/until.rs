@@ -78,10 +78,39 @@ fn what_is_reached_already_takes_no_increment() {
         outcome.stderr
     );
     assert!(
-        outcome.says("phase push: no increment"),
+        outcome.says("phase push: no increment: `settlement` is ")
+            && outcome.says("at its start, already beyond 0.01"),
         "{}",
         outcome.stderr
     );
+}
+
+/// Half of the excess pressure is left where the phase that drains ends; it stays, and the ground settles no more.
+#[test]
+fn excess_pressure_that_is_left_stays() {
+    let excess: Edit = (
+        "[probes]\n",
+        "[probes]\nexcess = { group = \"soil\", quantity = \"excess_pore_pressure\" }\n",
+    );
+    let drain = |until: &'static str| {
+        let (_, rows) = run(&[
+            excess,
+            ("law = \"soil\"", "law = \"soil\"\ndrainage = \"undrained\""),
+            ("displacement = [{ line = \"top\", x = 1e-5 }]", until),
+        ]);
+        let [weight, push, after] = ["weight", "push", "after"].map(|name| of_phase(&rows, name));
+        [weight[1], push[push.len() - 1], after[after.len() - 1]]
+    };
+    let after = "drainage = { soil = \"drained\" }\nuntil = { quantity = \"excess\", reaches = 2.0 }\n\
+         [[phase]]\nname = \"after\"\nincrements = 2";
+    let [[_, before, _], [_, ended, settled], [_, left, later]] = drain(after);
+    assert!(before > 3.0 && ended < 2.01, "{before} {ended}");
+    assert!((left / ended - 1.0).abs() < 1e-12, "{left} {ended}");
+    assert!((later / settled - 1.0).abs() < 1e-6, "{later} {settled}");
+    let again = "drainage = { soil = \"drained\" }\nuntil = { quantity = \"excess\", reaches = 2.0 }\n\
+         [[phase]]\nname = \"after\"\nincrements = 2\ndrainage = { soil = \"drained\" }";
+    let [.., [_, left, later]] = drain(again);
+    assert!(left.abs() < 1e-9 && later > settled, "{left}");
 }
 
 #[test]

@@ -37,7 +37,7 @@ pub(crate) enum Expression {
     Reference(Reference),
     Negative(Box<Expression>),
     Operation(char, Box<[Expression; 2]>),
-    Call(fn(f64) -> f64, Box<Expression>),
+    Call((&'static str, fn(f64) -> f64), Box<Expression>),
     /// The smallest or largest of some.
     Extreme(fn(f64, f64) -> f64, Vec<Expression>),
 }
@@ -84,6 +84,28 @@ impl Expression {
         Parser::new(text).whole()
     }
 
+    /// The name that stands alone, of the sentence about an expression that is none for its sake.
+    pub(crate) fn bare(why: &str) -> Option<&str> {
+        parser::bare(why)
+    }
+
+    /// The first function that makes no number of one, with its argument.
+    pub(crate) fn undefined<E>(
+        &self,
+        of: &mut dyn FnMut(&Reference) -> Result<f64, E>,
+    ) -> Option<String> {
+        match self {
+            Self::Number(_) | Self::Reference(_) => None,
+            Self::Negative(inner) => inner.undefined(of),
+            Self::Operation(_, both) => both.iter().find_map(|one| one.undefined(of)),
+            Self::Extreme(_, all) => all.iter().find_map(|one| one.undefined(of)),
+            Self::Call((name, function), inner) => inner.undefined(of).or_else(|| {
+                let x = inner.value(of).ok()?;
+                (x.is_finite() && !function(x).is_finite()).then(|| format!("`{name}({x})`"))
+            }),
+        }
+    }
+
     /// All that it takes from laws.
     pub(crate) fn references(&self) -> Vec<&Reference> {
         match self {
@@ -107,7 +129,7 @@ impl Expression {
             Self::Number(number) => *number,
             Self::Reference(reference) => of(reference)?,
             Self::Negative(inner) => -inner.value(of)?,
-            Self::Call(function, inner) => function(inner.value(of)?),
+            Self::Call((_, function), inner) => function(inner.value(of)?),
             Self::Operation(sign, both) => {
                 let (a, b) = (both[0].value(of)?, both[1].value(of)?);
                 match sign {

@@ -126,12 +126,11 @@ table! {
         hint ("`control = \"auto\"` in [solver]");
     Cause::NoWater => ("this phase changes the water, and there is none");
     Cause::AtRestOutsideStrength {
-        group, material, at: [x, y], stress: [h, v], returned: [r_h, r_v]
+        group, material, at: [x, y], stress: [h, v], returned: [r_h, r_v], unloading
     } => (
         "the earth pressure at rest of group `{group}` is outside the strength of law `{material}`: at \
          ({x:.4}, {y:.4}) horizontal {h:.4}, vertical {v:.4} kPa, where the law returns {r_h:.4} and {r_v:.4}")
-        hint (
-        "choose K_0 between the ratios of active and passive pressure; near the surface some cohesion also helps");
+        hint ("{}", less_at_rest(*unloading));
     Cause::TensionAtRest { at: [x, y], stress: [h, v] } => (
         "the earth pressure at rest is tension: at ({x:.4}, {y:.4}) horizontal {h:.4}, vertical {v:.4} kPa")
         hint ("with much unloading (`ocr`, `pop`) a smaller `poisson_ratio`, or give `k_0` itself");
@@ -176,6 +175,16 @@ fn name(key: Key) -> &'static str {
         Key::UnitWeight => "`unit_weight`",
         Key::Drainage => "`drainage`",
         Key::UndrainedPoissonRatio => "`undrained_poisson_ratio`",
+    }
+}
+
+fn less_at_rest(unloading: Option<[f64; 3]>) -> String {
+    match unloading {
+        Some([ocr, k_0, passive]) => format!(
+            "`ocr` = {ocr} gives K_0 = {k_0:.2}, beyond the passive ratio {passive:.2}: reduce `ocr`"
+        ),
+        None => "choose K_0 between the ratios of active and passive pressure; near the surface some cohesion also helps"
+            .to_owned(),
     }
 }
 

@@ -322,6 +322,20 @@ impl Simulation {
         self.begin_phase(watch)
     }
 
+    /// Bad input that shows only as laws start from their initial stresses.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]; other errors are left to the run.
+    pub fn check_start(mut self) -> Result<(), Error> {
+        if self.problem.phases.is_empty() {
+            return Ok(());
+        }
+        match self.start(0, &mut ()) {
+            Err(error @ Error::Refused(_)) => Err(error),
+            _ => Ok(()),
+        }
+    }
+
     /// Goes on by one increment, into the next phase where one is over. `None` after the last.
     ///
     /// # Errors

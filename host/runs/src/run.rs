@@ -13,6 +13,7 @@ use keeper::Keeper;
 use law::{Stop, hexadecimal_sha256};
 use mechanics::equilibrium::{Iteration, Reason, Reuse};
 use mechanics::group::Group;
+use mechanics::problem::Drainage;
 use mechanics::simulation::{Increment, Part, PhaseRecord, Reached, Snapshot, Warning, When};
 use mechanics::{Place, Problem, Simulation, State, Watch};
 use results::output_request::OutputRequest;
@@ -262,6 +263,7 @@ impl Ready<'_> {
                 resume(checkpoint, folder, wanted, &mut simulation, observer)?
             }
             None => {
+                check_start(case, simulation.problem())?;
                 let seen = (&simulation, &wanted);
                 let warnings = tell_warnings(case, &posed.laws, seen, posed.notes, observer);
                 let results = Recorder::create(folder, wanted, &about, &simulation)?;
@@ -286,6 +288,19 @@ impl Ready<'_> {
         *reuse = simulation.into_reuse();
         outcome
     }
+}
+
+/// Refuses what would be refused once the first phase starts, before anything is written.
+fn check_start(case: &Case, problem: &Problem) -> Result<(), Error> {
+    let may_refuse = (0..problem.groups.len()).any(|group| {
+        let is_at_rest = problem.groups[group].initial_stress.is_some();
+        is_at_rest || problem.drainage(group, 0) == Drainage::Undrained
+    });
+    if !may_refuse {
+        return Ok(());
+    }
+    let trial = Simulation::new(problem.clone()).and_then(Simulation::check_start);
+    trial.map_err(|error| case.place(error))
 }
 
 /// Has the solver say how much memory it is about to need.

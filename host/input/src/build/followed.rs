@@ -218,17 +218,50 @@ impl LawShelf<'_> {
             let message = format!("`{name}` is \"{label}\", no number");
             return Err(wrong(&asked.by, message).into());
         };
-        let expression =
-            Expression::parse(text).map_err(|why| wrong(&at, format!("`{name}`: {why}")))?;
+        let parsed = Expression::parse(text);
+        let expression = parsed.map_err(|why| self.misread(text, &at, name, &why))?;
         let mut asked = asked.clone();
         asked.chain.push(own);
         asked.by.clone_from(&at);
         let value = expression.value(&mut |reference| self.referred(reference, &asked))?;
         if !value.is_finite() {
-            let message = format!("`{name}`: the expression gives {value}, no number");
+            let by = expression.undefined(&mut |reference| self.referred(reference, &asked));
+            let by = by.map_or_else(String::new, |call| format!(": {call} is none"));
+            let message = format!("`{name}`: the expression gives {value}, no number{by}");
             return Err(wrong(&at, message).into());
         }
         Ok(value)
+    }
+
+    /// An error about a text that is no expression.
+    fn misread(&self, text: &str, at: &Range<usize>, name: &str, why: &str) -> text::Error {
+        let wrong = |why: &str| self.source.error(at.clone(), format!("`{name}`: {why}"));
+        let names = self.file.laws.keys().map(|key| key.get_ref());
+        let mut quoted =
+            names.filter(|law| law.contains(|c: char| !(c.is_alphanumeric() || c == '_')));
+        let after = |law: &String| Some(text.split_once(&format!("{law}."))?.1.trim_start());
+        if let Some((law, rest)) = quoted.find_map(|law| Some((law, after(law)?))) {
+            let end = rest.find(|c: char| !(c.is_alphanumeric() || c == '_'));
+            let parameter = &rest[..end.unwrap_or(rest.len())];
+            let hint =
+                format!("did you mean `\"{law}\".{parameter}`? Names with a hyphen need quotes");
+            return wrong(why).hint(hint).into();
+        }
+        let Some(bare) = Expression::bare(why) else {
+            return wrong(why).into();
+        };
+        let has = |law: &str, entry: &LawInput| {
+            let loaded = self.kept(law, entry);
+            loaded.is_ok_and(|law| law.description().parameters.iter().any(|p| p.id == bare))
+        };
+        let laws = self.file.laws.iter();
+        let owners = laws.filter(|(law, entry)| has(law.get_ref(), entry.get_ref()));
+        let owners = owners.map(|(law, _)| format!("`{}.{bare}`", text::key(law.get_ref())));
+        let owners: Vec<String> = owners.collect();
+        if owners.is_empty() {
+            return wrong(why).into();
+        }
+        wrong(&format!("`{bare}` lacks its law: {}", owners.join(" or "))).into()
     }
 
     fn declared<'l>(

@@ -135,9 +135,14 @@ impl<'a> LawShelf<'a> {
         }
         let loaded = self.loaded(entry)?;
         let built = try_law(&loaded, hypothesis, parameters).map_err(|failure| {
-            let error = place_failure(self.source, &entry.law, parameters, &failure);
-            if !matches!(failure.cause, BuildCause::Hypothesis { .. }) {
-                return error;
+            // A phase that swaps a law is where to look.
+            let by_phase = name.span() != group.law.span();
+            let at = if by_phase { name } else { &entry.law };
+            let error = place_failure(self.source, at, parameters, &failure);
+            match failure.cause {
+                BuildCause::Hypothesis { .. } => {}
+                BuildCause::Text(_) => return error.with_hint("an expression begins with `=`"),
+                _ => return place_failure(self.source, &entry.law, parameters, &failure),
             }
             let zone = entry.adapter.as_ref().filter(|_| entry.is_shear_zone());
             let error = zone.map_or(error, |adapter| {

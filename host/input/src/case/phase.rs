@@ -57,8 +57,8 @@ pub struct PhaseInput {
     /// to 1.
     #[schemars(with = "Option<Vec<[f64; 2]>>")]
     pub course: Option<Spanned<Vec<[f64; 2]>>>,
-    /// It ends before that where a quantity reaches a value. Loads and displacements stay where they are
-    /// then.
+    /// It ends before that where a quantity reaches a value. Loads, displacements and the excess pore
+    /// pressure that `drainage` leaves stay where they are then.
     #[schemars(with = "Option<UntilInput>")]
     pub until: Option<Spanned<UntilInput>>,
     /// Stress-free strains of groups at its end, expansion positive, since the start: heat, swelling,

@@ -4,6 +4,15 @@ use super::{EXTREMES, Expression, FUNCTIONS, MODULI, Reference};
 use std::iter::Peekable;
 use std::str::CharIndices;
 
+/// What is said of a name alone.
+const NO_VALUE: &str = "is no value";
+
+/// The name that stands alone, of what is said of it.
+pub(super) fn bare(why: &str) -> Option<&str> {
+    let (name, rest) = why.strip_prefix('`')?.split_once("` ")?;
+    rest.starts_with(NO_VALUE).then_some(name)
+}
+
 /// A text on its way.
 pub(super) struct Parser<'t> {
     text: &'t str,
@@ -20,7 +29,9 @@ impl<'t> Parser<'t> {
         let whole = self.sum()?;
         match self.next() {
             None => Ok(whole),
-            Some(c) => Err(format!("`{c}` is not expected there")),
+            Some(c) => {
+                Err(typographic(c).unwrap_or_else(|| format!("`{c}` is not expected there")))
+            }
         }
     }
 
@@ -113,7 +124,8 @@ impl<'t> Parser<'t> {
                 Ok(Expression::Number(value))
             }
             Some(c) if is_of_word(c) || "\"'".contains(c) => self.named(),
-            Some(c) => Err(format!("found `{c}`, expected a number, a name or `(`")),
+            Some(c) => Err(typographic(c)
+                .unwrap_or_else(|| format!("found `{c}`, expected a number, a name or `(`"))),
             None => Err("the expression ends, expected a number, a name or `(`".to_owned()),
         }
     }
@@ -127,15 +139,15 @@ impl<'t> Parser<'t> {
         }
         if self.peek() != Some('(') {
             return Err(format!(
-                "`{name}` is no value, expected a parameter of a law such as `{name}.cohesion`"
+                "`{name}` {NO_VALUE}, expected a parameter of a law such as `{name}.cohesion`"
             ));
         }
         self.next();
         let is_it = |id: &str| id == name;
         let call = if let Some((_, of)) = MODULI.iter().find(|(id, _)| is_it(id)) {
             Expression::Reference(of(self.name()?))
-        } else if let Some((_, function)) = FUNCTIONS.iter().find(|(id, _)| is_it(id)) {
-            Expression::Call(*function, Box::new(self.sum()?))
+        } else if let Some((id, function)) = FUNCTIONS.iter().find(|(id, _)| is_it(id)) {
+            Expression::Call((*id, *function), Box::new(self.sum()?))
         } else if let Some((_, choose)) = EXTREMES.iter().find(|(id, _)| is_it(id)) {
             let mut all = vec![self.sum()?];
             while self.take(",").is_some() {
@@ -147,7 +159,11 @@ impl<'t> Parser<'t> {
             let others = EXTREMES.iter().map(|(id, _)| *id);
             let moduli = MODULI.iter().map(|(id, _)| *id);
             let known = functions.chain(others).chain(moduli);
-            let hint = text::suggestion(&name, known);
+            let hint = if name == "ln" {
+                "did you mean `log`? It is the natural logarithm".to_owned()
+            } else {
+                text::suggestion(&name, known)
+            };
             return Err(format!("there is no function `{name}`, {hint}"));
         };
         self.expect(')')?;
@@ -167,6 +183,12 @@ impl<'t> Parser<'t> {
             word => Ok(word.to_owned()),
         }
     }
+}
+
+/// What to say of a sign that word processors make of a minus.
+fn typographic(c: char) -> Option<String> {
+    let is_it = matches!(c, '\u{2212}' | '\u{2013}');
+    is_it.then(|| format!("`{c}` is a typographic minus: write `-`"))
 }
 
 fn is_of_word(c: char) -> bool {

@@ -40,12 +40,14 @@ pub(super) fn check(problem: &Problem) -> Result<(), Refusal> {
 fn check_group(number: usize, group: &ElementGroup, is_undrained: bool) -> Result<(), Refusal> {
     let refuse = |key, cause| Err(Refusal::new(Item::GroupKey(number, key), cause));
     let weights = [Some(group.unit_weight), group.saturated_unit_weight];
-    if let Some(weight) = weights
-        .into_iter()
-        .flatten()
-        .find(|w| !(w.is_finite() && *w >= 0.0))
-    {
-        let cause = Cause::OutOfBounds("the unit weight", weight, "zero or more");
+    let named = ["`unit_weight`", "`saturated_unit_weight`"].into_iter();
+    let mut named = named.zip(weights);
+    let negative = |(name, weight): (_, Option<f64>)| {
+        let weight = weight.filter(|w| !(w.is_finite() && *w >= 0.0))?;
+        Some((name, weight))
+    };
+    if let Some((name, weight)) = named.find_map(negative) {
+        let cause = Cause::OutOfBounds(name, weight, "zero or more");
         return refuse(Key::UnitWeight, cause);
     }
     let is_solid = group.formulation == Formulation::Solid;

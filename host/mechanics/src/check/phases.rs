@@ -178,11 +178,8 @@ fn ground(problem: &Problem, number: usize, phase: &Phase) -> Result<(), Refusal
             return refuse(Cause::Misplaced(Key::UnitWeight, formulation));
         }
         if !(weight.is_finite() && weight >= 0.0) {
-            return refuse(Cause::OutOfBounds(
-                "the unit weight",
-                weight,
-                "zero or more",
-            ));
+            let what = "`unit_weight`";
+            return refuse(Cause::OutOfBounds(what, weight, "zero or more"));
         }
     }
     for (place, &(group, _)) in phase.drainage.iter().enumerate() {

@@ -107,12 +107,12 @@ fn water_inside(problem: &Problem) -> Vec<String> {
                 sum / corners.len() as f64
             };
             warnings.push(format!(
-                "phase `{}` changes a water table that stands inside {} elements before or after, the first \
+                "phase `{}` changes a water table that stands inside {} before or after, the first \
                  around ({:.4}, {:.4}): they see its pressure at their integration points, and the settlement \
                  that it causes is off, by up to 1 % where three elements stand over one another, less on \
                  finer meshes. A row of the mesh, or a curve of its file, along the table makes it exact",
                 phase.name,
-                cut.len(),
+                counted(cut.len(), "element"),
                 middle(0),
                 middle(1)
             ));
@@ -120,6 +120,11 @@ fn water_inside(problem: &Problem) -> Vec<String> {
         level = next;
     }
     warnings
+}
+
+/// A number of things, by their name in the singular.
+fn counted(n: usize, one: &str) -> String {
+    format!("{n} {one}{}", if n == 1 { "" } else { "s" })
 }
 
 /// Stiffness that no material has, in words. Diamond, the stiffest, has 1.08e9 kPa; jelly has 1 kPa.
@@ -210,9 +215,14 @@ fn weights(problem: &Problem) -> Vec<String> {
         });
         warnings.extend(strange.into_iter().chain(lighter));
     }
+    // What takes another law, such as concrete, is ground no longer.
+    let mut swapped = HashSet::new();
     for phase in &problem.phases {
+        swapped.extend(phase.materials.iter().map(|(group, _)| *group));
         for &(group, value) in &phase.unit_weight {
-            if let Some(why) = strange_weight(value, false) {
+            let is_ground =
+                problem.groups[group].initial_stress.is_some() && !swapped.contains(&group);
+            if let Some(why) = strange_weight(value, is_ground) {
                 let (phase, group) = (&phase.name, &problem.groups[group].name);
                 warnings.push(format!(
                     "phase `{phase}`: `unit_weight` of group `{group}` is {why}"

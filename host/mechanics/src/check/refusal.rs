@@ -306,6 +306,8 @@ pub enum Cause {
         stress: [f64; 2],
         /// What the law makes of them.
         returned: [f64; 2],
+        /// The `ocr` that gives them, K_0, and the passive ratio of the friction angle beside it, if K_0 exceeds this.
+        unloading: Option<[f64; 3]>,
     },
     /// Earth pressure at rest that would be tension.
     TensionAtRest {

@@ -109,6 +109,23 @@ pub enum Ratio {
 }
 
 impl Ratio {
+    /// The overconsolidation ratio at a height, its K_0, and tan²(45° + φ/2), if K_0 exceeds that.
+    pub fn beyond_passive(&self, y: f64) -> Option<[f64; 3]> {
+        let Self::Overconsolidated {
+            friction_angle,
+            ocr,
+            pop,
+            ..
+        } = self
+        else {
+            return None;
+        };
+        let half = 0.5 * friction_angle.at(y).to_radians();
+        let passive = (std::f64::consts::FRAC_PI_4 + half).tan().powi(2);
+        let k_0 = self.horizontal(1.0, y);
+        (pop.at(y) == 0.0 && k_0 > passive).then(|| [ocr.at(y), k_0, passive])
+    }
+
     /// σ'_h for σ'_v (compression positive) at a height.
     pub fn horizontal(&self, vertical: f64, y: f64) -> f64 {
         match self {

@@ -24,13 +24,8 @@ impl Simulation {
         number: usize,
         appeared: &[usize],
     ) -> Result<Vec<Vec<f64>>, Error> {
-        // With the water between the faces.
-        let mut acting = self.loading[0].clone();
-        for &group in appeared {
-            acting.active[group] = true;
-        }
         let appeared: Vec<&Group> = appeared.iter().map(|&group| &self.groups[group]).collect();
-        let mut lacking = acting.forces(&self.problem, &self.groups);
+        let mut lacking = self.loading[0].forces(&self.problem, &self.groups);
         let mut internal = self.released.clone();
         for group in self.groups.iter().filter(|group| group.is_active) {
             group.kinematics.add_forces(&group.carried(), &mut internal);

@@ -189,6 +189,9 @@ impl Simulation {
         self.keep_loads(phase.number, &phase.course);
         let length = self.problem.phases[phase.number].length();
         self.time += if phase.course.is_over {
+            for &(group, _) in &self.problem.phases[phase.number].drainage {
+                self.groups[group].leave_excess(true);
+            }
             phase.course.lambda * length
         } else {
             length

@@ -36,7 +36,11 @@ impl Simulation {
         let phase = self.problem.phases[number].clone();
         let mut starts = vec![number == 0; self.groups.len()];
         let moment = self.moment(number, 1);
-        let start = self.loading[1].clone();
+        let mut start = self.loading[1].clone();
+        // Water between faces that were closed had its pressure before.
+        for &group in &phase.activate {
+            start.active[group] |= self.groups[group].formulation == Formulation::ZeroThickness;
+        }
         if !phase.activate.is_empty() {
             // Faces that were one part: each has its own share of what acts on them.
             self.force = start.forces(&self.problem, &self.groups);
@@ -94,6 +98,9 @@ impl Simulation {
                 continue;
             }
             group.moment = moment;
+            if is_changed {
+                group.leave_excess(false);
+            }
             let own = &self.problem.groups[of];
             let drainage = self.problem.drainage(of, number);
             let set = group.set_drainage(drainage, own.undrained_poisson_ratio);
@@ -208,14 +215,17 @@ impl Simulation {
         match self.groups[group].take_over() {
             Ok(Some(change)) if change.change > worth => {
                 let own = &self.problem.groups[group];
-                let at_rest = matches!(own.initial_stress, Some(InitialStress::AtRest(_)));
-                if number == 0 && at_rest && change.relative > OUTSIDE {
+                if let Some(InitialStress::AtRest(at_rest)) = &own.initial_stress
+                    && number == 0
+                    && change.relative > OUTSIDE
+                {
                     let cause = Cause::AtRestOutsideStrength {
                         group: change.group,
                         material: change.law,
                         at: change.position,
                         stress: change.stress[0].map(|stress| -stress),
                         returned: change.stress[1].map(|stress| -stress),
+                        unloading: at_rest.ratio.beyond_passive(change.position[1]),
                     };
                     let item = Item::GroupKey(group, Key::InitialStress);
                     return Err(Refusal::new(item, cause).into());

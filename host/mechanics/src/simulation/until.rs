@@ -13,6 +13,8 @@ const WITHIN: f64 = 8e-3;
 const AIM: f64 = 3e-3;
 /// The same for what rounding leaves.
 const ROUND_OFF: f64 = 1e-9;
+/// Half of the last digit of a value that is shown.
+const SHOWN: f64 = 5e-7;
 /// Shortest and longest part of a step that is taken again.
 const PART: [f64; 2] = [0.02, 0.98];
 /// Repeated steps after which the next ones are halved, and the largest number of repeated steps.
@@ -47,10 +49,12 @@ impl fmt::Display for Reached {
             part,
         } = self;
         if *increment == 0 {
-            return write!(
-                f,
-                "phase {phase}: no increment, `{quantity}` has reached {reaches} before it: {value:.6}"
-            );
+            write!(f, "phase {phase}: no increment: `{quantity}` is ")?;
+            return if is_at(*value, *reaches) {
+                write!(f, "already {reaches} at its start")
+            } else {
+                write!(f, "{value:.6} at its start, already beyond {reaches}")
+            };
         }
         write!(
             f,
@@ -58,6 +62,11 @@ impl fmt::Display for Reached {
              reached {reaches}, it is {value:.6}"
         )
     }
+}
+
+/// Whether a value is one that was asked for, to the digits that are shown.
+fn is_at(value: f64, asked: f64) -> bool {
+    (value - asked).abs() <= SHOWN.max(ROUND_OFF * asked.abs())
 }
 
 /// What follows a step.
@@ -89,8 +98,8 @@ impl Simulation {
             let name = &self.problem.phases[phase.number].name;
             let value = watch.quantity(name, &until.quantity, &self.snapshot());
             phase.course.measured = value.map(|value| [value; 2]);
-            let near = |value: f64| (value - until.reaches).abs() <= ROUND_OFF * value.abs();
-            if let Some(value) = value.filter(|value| near(*value)) {
+            let near = |value: &f64| (value - until.reaches).abs() <= ROUND_OFF * value.abs();
+            if let Some(value) = value.filter(near) {
                 phase.course.is_over = true;
                 watch.reached(&self.reached(&phase, until, value));
             }

@@ -51,7 +51,8 @@ fn an_interface_beside_dry_pores_starts_in_balance() {
 }
 
 /// Blocks with an interface that is absent move as one; activated, nothing moves, and its traction is
-/// the stress next to it. Without water no node is out of balance in the course of that phase.
+/// the stress next to it. No node is out of balance in the course of that phase, in which water between the faces has
+/// its whole pressure.
 #[test]
 fn an_interface_appears_with_the_stress_beside_it() {
     let all = [(Shape::Rectangles, true), (Shape::Cut, true)];
@@ -98,12 +99,12 @@ fn an_interface_appears_with_the_stress_beside_it() {
         let state = simulation.snapshot();
         let inside = state.mesh.nodes.iter().enumerate();
         let inside = inside.filter(|(_, [x, y])| *x > 0.0 && *x < 2.0 && *y > 0.0);
-        // The water between the faces comes in the course of the phase.
-        let inside = inside.filter(|_| !is_wet);
         for (node, at) in inside {
             let left = largest(&state.reaction[2 * node..2 * node + 2]);
             assert!(left < 1e-9, "{shape:?}: {left} at {at:?}");
         }
+        let between = state.acting.pore_pressure(2, state.problem, [0.3, 1.0]);
+        assert_eq!(between, if is_wet { 10.0 } else { 0.0 });
         simulation.run(&mut ()).unwrap();
         let moved = largest(simulation.snapshot().displacement);
         assert!(moved < 1e-12, "{shape:?}: {moved}");

@@ -54,12 +54,15 @@ impl OfPhase {
     }
 
     /// Why a curve of it is no load test: the head moves although no load on it rises, as with ground that settles.
-    fn no_test(&self, curve: &[[f64; 4]]) -> Option<String> {
+    fn no_test(&self, curve: &[[f64; 4]], direction: f64) -> Option<String> {
         let loads = || curve.iter().map(|point| point[1]);
         let most = loads().fold(0.0, |m: f64, load| m.max(load.abs()));
         let highest = loads().fold(f64::NEG_INFINITY, f64::max);
         let is_test = self.moves_head || highest > curve[0][1] + HELD * most;
         (!is_test).then(|| {
+            if direction < 0.0 {
+                return "no phase pulls the head up".to_owned();
+            }
             format!(
                 "the head moves by {:.6} m in phase `{}` under a load that does not rise: no load test",
                 largest(curve) - curve[0][0],
@@ -186,7 +189,7 @@ impl Curve {
         let moves = |phase: &&OfPhase| {
             let end = phase.points.last();
             end.is_some_and(|end| end[0] > phase.start[0])
-                && phase.no_test(&phase.curve(1.0)).is_none()
+                && phase.no_test(&phase.curve(1.0), 1.0).is_none()
         };
         self.in_place().find(moves)
     }
@@ -218,7 +221,7 @@ impl Curve {
                 continue;
             }
             let found = phase
-                .no_test(&curve)
+                .no_test(&curve, direction)
                 .map_or_else(|| find(phase, &curve), Err);
             match found {
                 Ok([_, head, shaft, base]) => {
@@ -471,7 +474,8 @@ fn chin(points: &[[f64; 4]]) -> Result<f64, String> {
     let n = line.len();
     if n < FEWEST {
         return Err(format!(
-            "{n} points from half of the largest settlement on, and a line takes {FEWEST}"
+            "only {n} point{} from half of the largest settlement on; {FEWEST} are needed",
+            if n == 1 { "" } else { "s" }
         ));
     }
     let mean = |c: usize| line.iter().map(|point| point[c]).sum::<f64>() / n as f64;

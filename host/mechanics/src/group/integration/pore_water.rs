@@ -8,7 +8,8 @@
 //!
 //! where G and K' are those of the law's elastic operator and ν_u is Poisson's ratio of the undrained ground. The law
 //! sees effective stresses σ'; the element carries σ' − u δ, with the tangent D + (K_w/n) δ δᵀ. When it drains again,
-//! the remaining u dissipates in proportion to the phase's time, however long that is.
+//! the remaining u dissipates in proportion to the phase's time, however long that is; what an early end of the phase
+//! leaves stays.
 
 use super::PointFailure;
 use crate::element::Axes;
@@ -26,6 +27,8 @@ pub(in crate::group) struct Pores {
     pub(in crate::group) excess: Field,
     /// K_w/n of every point, kPa; nothing while it drains.
     stiffness: Vec<f64>,
+    /// The phase that drained it has ended early: the excess pressure left stays.
+    is_left: bool,
 }
 
 impl Group {
@@ -77,6 +80,7 @@ impl Group {
             drainage,
             excess,
             stiffness,
+            is_left: false,
         });
         Ok(Ok(()))
     }
@@ -90,6 +94,13 @@ impl Group {
     pub fn excess_pore_pressure(&self, point: usize) -> f64 {
         let pores = self.pores.as_ref();
         pores.map_or(0.0, |pores| pores.excess.committed[point])
+    }
+
+    /// Whether what is left of a draining excess pressure stays, or dissipates.
+    pub(crate) fn leave_excess(&mut self, is_left: bool) {
+        if let Some(pores) = &mut self.pores {
+            pores.is_left = is_left;
+        }
     }
 
     /// Whether it is undrained now.
@@ -114,7 +125,7 @@ impl Group {
             for (((u, u_0), k), (strain, strain_0)) in points.zip(strains) {
                 *u = u_0 - k * (volume(strain) - volume(strain_0) + swollen);
             }
-        } else {
+        } else if !pores.is_left {
             let since = (time - self.moment.step_start) / self.moment.step_length;
             let share = time_increment / self.moment.step_length;
             let left = |share: f64| (1.0 - share).max(0.0);
