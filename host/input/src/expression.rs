@@ -6,6 +6,7 @@
 mod parser;
 
 use self::parser::Parser;
+use std::fmt;
 
 /// Longest text of an expression, in bytes: it bounds how deep expressions nest.
 const LONGEST: usize = 500;
@@ -67,6 +68,33 @@ const MODULI: Named<fn(String) -> Reference, 2> = [
     ("oedometric_modulus", Reference::OedometricModulus),
 ];
 
+/// Why a text is no expression.
+#[derive(Debug)]
+pub(crate) enum Wrong {
+    /// A name without a law and without arguments.
+    NameAlone(String),
+    /// Anything else, in words.
+    Other(String),
+}
+
+impl From<String> for Wrong {
+    fn from(words: String) -> Self {
+        Self::Other(words)
+    }
+}
+
+impl fmt::Display for Wrong {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NameAlone(name) => write!(
+                f,
+                "`{name}` is no value, expected a parameter of a law such as `{name}.cohesion`"
+            ),
+            Self::Other(words) => f.write_str(words),
+        }
+    }
+}
+
 impl Expression {
     /// The text of an expression without its `=`; `None` of another text.
     pub(crate) fn text(label: &str) -> Option<&str> {
@@ -77,16 +105,11 @@ impl Expression {
     ///
     /// # Errors
     /// A sentence about the first part that is not an expression.
-    pub(crate) fn parse(text: &str) -> Result<Self, String> {
+    pub(crate) fn parse(text: &str) -> Result<Self, Wrong> {
         if text.len() > LONGEST {
-            return Err(format!("the expression is longer than {LONGEST} bytes"));
+            return Err(format!("the expression is longer than {LONGEST} bytes").into());
         }
         Parser::new(text).whole()
-    }
-
-    /// The name that stands alone, of the sentence about an expression that is none for its sake.
-    pub(crate) fn bare(why: &str) -> Option<&str> {
-        parser::bare(why)
     }
 
     /// The first function that makes no number of one, with its argument.
@@ -238,7 +261,7 @@ mod tests {
             ("'clay.c", "expected `'`"),
             ("2 % 3", "`%`"),
         ] {
-            let why = Expression::parse(text).unwrap_err();
+            let why = Expression::parse(text).unwrap_err().to_string();
             assert!(why.contains(words), "{text}: {why}");
         }
         assert!(Expression::parse(&"(".repeat(501)).is_err());

@@ -3,7 +3,7 @@
 use super::law_shelf::LawShelf;
 use crate::Error;
 use crate::case::LawInput;
-use crate::expression::{Expression, Reference};
+use crate::expression::{Expression, Reference, Wrong};
 use crate::ground::ProfileInput;
 use crate::material::{ParameterTable, ParameterValue, given, place_failure};
 use abi::Hypothesis;
@@ -11,6 +11,7 @@ use law::{BuiltLaw, LoadedLaw, Operator, ParameterDescription};
 use mechanics::ground::InitialStresses;
 use mechanics::model;
 use mechanics::problem::{Formulation, Variation};
+use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
 use text::suggestion;
@@ -234,8 +235,9 @@ impl LawShelf<'_> {
     }
 
     /// An error about a text that is no expression.
-    fn misread(&self, text: &str, at: &Range<usize>, name: &str, why: &str) -> text::Error {
-        let wrong = |why: &str| self.source.error(at.clone(), format!("`{name}`: {why}"));
+    fn misread(&self, text: &str, at: &Range<usize>, name: &str, why: &Wrong) -> text::Error {
+        let wrong =
+            |why: &dyn fmt::Display| self.source.error(at.clone(), format!("`{name}`: {why}"));
         let names = self.file.laws.keys().map(|key| key.get_ref());
         let mut quoted =
             names.filter(|law| law.contains(|c: char| !(c.is_alphanumeric() || c == '_')));
@@ -247,12 +249,12 @@ impl LawShelf<'_> {
                 format!("did you mean `\"{law}\".{parameter}`? Names with a hyphen need quotes");
             return wrong(why).hint(hint).into();
         }
-        let Some(bare) = Expression::bare(why) else {
+        let Wrong::NameAlone(bare) = why else {
             return wrong(why).into();
         };
         let has = |law: &str, entry: &LawInput| {
             let loaded = self.kept(law, entry);
-            loaded.is_ok_and(|law| law.description().parameters.iter().any(|p| p.id == bare))
+            loaded.is_ok_and(|law| law.description().parameters.iter().any(|p| p.id == *bare))
         };
         let laws = self.file.laws.iter();
         let owners = laws.filter(|(law, entry)| has(law.get_ref(), entry.get_ref()));

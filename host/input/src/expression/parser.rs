@@ -1,17 +1,8 @@
 //! Reads expressions, by recursive descent.
 
-use super::{EXTREMES, Expression, FUNCTIONS, MODULI, Reference};
+use super::{EXTREMES, Expression, FUNCTIONS, MODULI, Reference, Wrong};
 use std::iter::Peekable;
 use std::str::CharIndices;
-
-/// What is said of a name alone.
-const NO_VALUE: &str = "is no value";
-
-/// The name that stands alone, of what is said of it.
-pub(super) fn bare(why: &str) -> Option<&str> {
-    let (name, rest) = why.strip_prefix('`')?.split_once("` ")?;
-    rest.starts_with(NO_VALUE).then_some(name)
-}
 
 /// A text on its way.
 pub(super) struct Parser<'t> {
@@ -25,13 +16,13 @@ impl<'t> Parser<'t> {
         Self { text, rest }
     }
 
-    pub(super) fn whole(&mut self) -> Result<Expression, String> {
+    pub(super) fn whole(&mut self) -> Result<Expression, Wrong> {
         let whole = self.sum()?;
         match self.next() {
             None => Ok(whole),
-            Some(c) => {
-                Err(typographic(c).unwrap_or_else(|| format!("`{c}` is not expected there")))
-            }
+            Some(c) => Err(typographic(c)
+                .unwrap_or_else(|| format!("`{c}` is not expected there"))
+                .into()),
         }
     }
 
@@ -53,11 +44,11 @@ impl<'t> Parser<'t> {
         Some(next)
     }
 
-    fn expect(&mut self, wanted: char) -> Result<(), String> {
+    fn expect(&mut self, wanted: char) -> Result<(), Wrong> {
         match self.next() {
             Some(c) if c == wanted => Ok(()),
-            Some(c) => Err(format!("found `{c}`, expected `{wanted}`")),
-            None => Err(format!("the expression ends, expected `{wanted}`")),
+            Some(c) => Err(format!("found `{c}`, expected `{wanted}`").into()),
+            None => Err(format!("the expression ends, expected `{wanted}`").into()),
         }
     }
 
@@ -72,19 +63,19 @@ impl<'t> Parser<'t> {
         &self.text[start..self.rest.peek().map_or(end, |(at, _)| *at)]
     }
 
-    fn sum(&mut self) -> Result<Expression, String> {
+    fn sum(&mut self) -> Result<Expression, Wrong> {
         self.chain("+-", Self::product)
     }
 
-    fn product(&mut self) -> Result<Expression, String> {
+    fn product(&mut self) -> Result<Expression, Wrong> {
         self.chain("*/", Self::signed)
     }
 
     fn chain(
         &mut self,
         signs: &str,
-        part: fn(&mut Self) -> Result<Expression, String>,
-    ) -> Result<Expression, String> {
+        part: fn(&mut Self) -> Result<Expression, Wrong>,
+    ) -> Result<Expression, Wrong> {
         let mut all = part(self)?;
         while let Some(sign) = self.take(signs) {
             all = Expression::Operation(sign, Box::new([all, part(self)?]));
@@ -92,7 +83,7 @@ impl<'t> Parser<'t> {
         Ok(all)
     }
 
-    fn signed(&mut self) -> Result<Expression, String> {
+    fn signed(&mut self) -> Result<Expression, Wrong> {
         match self.take("+-") {
             Some('-') => Ok(Expression::Negative(Box::new(self.signed()?))),
             Some(_) => self.signed(),
@@ -106,7 +97,7 @@ impl<'t> Parser<'t> {
         }
     }
 
-    fn single(&mut self) -> Result<Expression, String> {
+    fn single(&mut self) -> Result<Expression, Wrong> {
         match self.peek() {
             Some('(') => {
                 self.next();
@@ -125,22 +116,23 @@ impl<'t> Parser<'t> {
             }
             Some(c) if is_of_word(c) || "\"'".contains(c) => self.named(),
             Some(c) => Err(typographic(c)
-                .unwrap_or_else(|| format!("found `{c}`, expected a number, a name or `(`"))),
-            None => Err("the expression ends, expected a number, a name or `(`".to_owned()),
+                .unwrap_or_else(|| format!("found `{c}`, expected a number, a name or `(`"))
+                .into()),
+            None => Err("the expression ends, expected a number, a name or `(`"
+                .to_owned()
+                .into()),
         }
     }
 
     /// A function with its arguments, or a parameter of a law.
-    fn named(&mut self) -> Result<Expression, String> {
+    fn named(&mut self) -> Result<Expression, Wrong> {
         let name = self.name()?;
         if self.take(".").is_some() {
             let parameter = self.name()?;
             return Ok(Expression::Reference(Reference::Parameter(name, parameter)));
         }
         if self.peek() != Some('(') {
-            return Err(format!(
-                "`{name}` {NO_VALUE}, expected a parameter of a law such as `{name}.cohesion`"
-            ));
+            return Err(Wrong::NameAlone(name));
         }
         self.next();
         let is_it = |id: &str| id == name;
@@ -164,14 +156,14 @@ impl<'t> Parser<'t> {
             } else {
                 text::suggestion(&name, known)
             };
-            return Err(format!("there is no function `{name}`, {hint}"));
+            return Err(format!("there is no function `{name}`, {hint}").into());
         };
         self.expect(')')?;
         Ok(call)
     }
 
     /// A word, or anything in quotes.
-    fn name(&mut self) -> Result<String, String> {
+    fn name(&mut self) -> Result<String, Wrong> {
         if let Some(quote) = self.take("\"'") {
             let name = self.run(|_, c| c != quote);
             self.expect(quote)?;
@@ -179,7 +171,7 @@ impl<'t> Parser<'t> {
         }
         self.peek();
         match self.run(|_, c| is_of_word(c)) {
-            "" => Err("a name is missing".to_owned()),
+            "" => Err("a name is missing".to_owned().into()),
             word => Ok(word.to_owned()),
         }
     }

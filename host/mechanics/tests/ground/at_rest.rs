@@ -270,10 +270,10 @@ fn a_water_table_inside_elements_is_announced_where_it_changes() {
     };
     assert_eq!(warnings(2.5, None), Vec::<String>::new());
     assert_eq!(warnings(2.0, Some(1.0)), Vec::<String>::new());
-    for (from, to, n) in [(2.5, 1.0, 1), (2.5, 0.5, 2), (2.0, 0.3, 1)] {
+    let [one, two] = ["1 element before", "2 elements before"];
+    for (from, to, n) in [(2.5, 1.0, one), (2.5, 0.5, two), (2.0, 0.3, one)] {
         let found = warnings(from, Some(to));
-        let expected =
-            format!("phase `pump` changes a water table that stands inside {n} elements");
+        let expected = format!("phase `pump` changes a water table that stands inside {n}");
         assert!(found[0].starts_with(&expected), "{found:?}");
     }
 }

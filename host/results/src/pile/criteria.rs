@@ -557,7 +557,7 @@ mod tests {
     #[test]
     fn chin_says_why_there_is_no_limit() {
         let few = chin(&hyperbola(5, 0.1, [2e-6, 4e-4])).unwrap_err();
-        assert!(few.starts_with("3 points"), "{few}");
+        assert!(few.starts_with("only 3 points"), "{few}");
         // An elastic pile.
         let straight = chin(&hyperbola(20, 0.1, [2e-6, 0.0])).unwrap_err();
         assert!(
