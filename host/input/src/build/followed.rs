@@ -238,7 +238,7 @@ impl LawShelf<'_> {
     fn misread(&self, text: &str, at: &Range<usize>, name: &str, why: &Wrong) -> text::Error {
         let wrong =
             |why: &dyn fmt::Display| self.source.error(at.clone(), format!("`{name}`: {why}"));
-        let names = self.file.laws.keys().map(|key| key.get_ref());
+        let names = self.file.laws.keys().map(Spanned::get_ref);
         let mut quoted =
             names.filter(|law| law.contains(|c: char| !(c.is_alphanumeric() || c == '_')));
         let after = |law: &String| Some(text.split_once(&format!("{law}."))?.1.trim_start());
