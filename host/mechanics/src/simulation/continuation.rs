@@ -1,8 +1,8 @@
 //! Control of the steps of an increment. Under `control = "auto"` the load leads first. If ever shorter steps by the
 //! load fail, viscous control leads by short steps to the end of the increment; if it fails too, both lead by turns.
 //! The last resort, also under `control = "viscous"`, is viscous control by single corrections, if interfaces may
-//! break. They also begin where bonds opened in several failed steps of an increment; if they then fail, what they took
-//! the place of goes on.
+//! break. They also begin where bonds opened in several failed steps of an increment; if they then fail, the control
+//! before them leads again.
 
 use crate::equilibrium::{Reason, Singularity, StepFailure};
 use crate::settings::{Control, Settings};
@@ -13,7 +13,7 @@ use crate::settings::{Control, Settings};
 /// the length of the steps.
 const PATIENCE: usize = 5;
 /// Steps of an increment that may fail where a bond opens. Shorter steps fail too: the bond breaks at the end of the
-/// longest step that finds equilibrium.
+/// longest step that finds equilibrium. After two of them a pile that is pulled off its base finds no way on.
 const OPENINGS: usize = 3;
 /// Longest step under viscous control, as a fraction of an increment.
 pub(super) const LONGEST: f64 = 0.125;
@@ -36,9 +36,8 @@ pub(super) struct Lead {
     failures: usize,
     /// Steps that failed where a bond opened.
     openings: usize,
-    /// Where single corrections began because bonds opened: the control and the step, as a load factor, that they took
-    /// the place of.
-    instead_of: Option<(Control, f64)>,
+    /// Control and length of the next step, as a load factor, before single corrections that began because bonds opened.
+    before_early: Option<(Control, f64)>,
     /// Viscous control goes by single corrections.
     pub(super) singly: bool,
     /// How often that may be begun with.
@@ -58,7 +57,7 @@ impl Lead {
             was_in_vain: false,
             failures: 0,
             openings: 0,
-            instead_of: None,
+            before_early: None,
             singly: false,
             beginnings: if may_be_viscous || is_viscous {
                 BEGINNINGS
@@ -102,20 +101,20 @@ impl Lead {
         failure.opens_bond && !self.singly && self.openings == OPENINGS
     }
 
-    /// Turns to single corrections where bonds open, instead of a step of this length. Returns the length of the first
-    /// one.
+    /// Turns to single corrections because bonds opened; `step` is the length that the next step would have had. Returns
+    /// the length of the first one.
     pub(super) fn begins_early(&mut self, step: f64, shortest: f64, n: f64) -> Option<f64> {
         if self.beginnings == 0 {
             return None;
         }
-        self.instead_of = Some((self.control, step));
+        self.before_early = Some((self.control, step));
         (self.singly, self.control) = (true, Control::Viscous);
         Some(shortest.min(LONGEST / n))
     }
 
-    /// Turns back from single corrections that began early to what they took the place of, with a step of its length.
+    /// Turns back from single corrections that began because bonds opened. Returns the length of the next step.
     pub(super) fn turns_back(&mut self) -> Option<f64> {
-        let (control, step) = self.instead_of.take()?;
+        let (control, step) = self.before_early.take()?;
         (self.singly, self.control) = (false, control);
         Some(step)
     }

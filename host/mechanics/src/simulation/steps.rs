@@ -55,7 +55,7 @@ enum Then {
     Viscous,
     /// Viscous control by single corrections, from here on, with a first step of this length.
     Singly(f64),
-    /// What single corrections took the place of, with a step of this length.
+    /// The control before single corrections, with a step of this length.
     Back(f64),
     /// Nothing.
     End,

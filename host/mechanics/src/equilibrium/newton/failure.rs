@@ -221,7 +221,7 @@ pub struct StepFailure {
     pub culprit: Option<Culprit>,
     /// What gives way, if that could be found out.
     pub mechanism: Option<Mechanism>,
-    /// A point of an interface with a bond opens in the last iterate.
+    /// A point of an interface with a bond opened in an iterate of the step.
     pub opens_bond: bool,
 }
 
