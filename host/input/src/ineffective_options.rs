@@ -25,33 +25,7 @@ fn of(solver: &Settings) -> Vec<String> {
             "`tangents = \"differences\"` has no effect with `method = \"{method}\"`, whose matrix is the elastic stiffness"
         ));
     }
-    found.extend(regularisation(solver));
     found
-}
-
-/// Regularised corrections take the place of viscous relaxation: what keeps this off keeps them off.
-fn regularisation(solver: &Settings) -> Option<String> {
-    let cause = if !solver.regularisation {
-        return None;
-    } else if !solver.method.is_newton() {
-        format!(
-            "`method = \"{}\"`: regularised corrections are those of `auto` and `newton`",
-            solver.method.name()
-        )
-    } else if !solver.control.relaxes() {
-        format!(
-            "`control = \"{}\"`: regularised corrections take the place of viscous relaxation, with `auto` and `load`",
-            solver.control.name()
-        )
-    } else if !solver.relaxation {
-        "`relaxation = false`: regularised corrections take the place of viscous relaxation"
-            .to_owned()
-    } else {
-        return None;
-    };
-    Some(format!(
-        "`regularisation = true` has no effect with {cause}"
-    ))
 }
 
 #[cfg(test)]
@@ -88,44 +62,5 @@ mod tests {
             said.len() == 1 && said[0].contains("differences"),
             "{said:?}"
         );
-    }
-
-    #[test]
-    fn regularised_corrections_need_relaxation() {
-        let with = |method, control, relaxation| {
-            of(&Settings {
-                method,
-                control,
-                relaxation,
-                regularisation: true,
-                ..Settings::default()
-            })
-        };
-        for control in [Control::Auto, Control::Load] {
-            for method in [Method::Auto, Method::Newton] {
-                assert!(with(method, control, true).is_empty(), "{control:?}");
-            }
-        }
-        for (said, cause) in [
-            (
-                with(Method::Auto, Control::Load, false),
-                "`relaxation = false`",
-            ),
-            (
-                with(Method::Newton, Control::Viscous, true),
-                "`control = \"viscous\"`",
-            ),
-            (
-                with(Method::Auto, Control::ArcLength, true),
-                "`control = \"arc_length\"`",
-            ),
-            (
-                with(Method::QuasiNewton, Control::Auto, true),
-                "`method = \"quasi_newton\"`",
-            ),
-        ] {
-            let begins = format!("`regularisation = true` has no effect with {cause}");
-            assert!(said.len() == 1 && said[0].starts_with(&begins), "{said:?}");
-        }
     }
 }

@@ -282,6 +282,7 @@ pub struct Phase {
     pub(crate) viscous_steps: usize,
     pub(crate) viscous_from: Option<usize>,
     pub(crate) single_corrections_from: Option<usize>,
+    pub(crate) regularised_steps: usize,
     pub(crate) tolerated_steps: usize,
     pub(crate) tolerated_residual: Option<f64>,
     pub(crate) tolerated_force: Option<f64>,

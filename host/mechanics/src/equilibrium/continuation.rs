@@ -114,6 +114,7 @@ impl Newton<'_> {
                 let open = self.open(&equilibrium.state.balance, &iterations);
                 Ok(StepSuccess {
                     relaxed: viscous.has_led_here(),
+                    regularised: control.regularised.has_begun(),
                     was_kept: self.keeps(),
                     was_motion: viscous.lets_expect_another() || control.regularised.has_begun(),
                     open,
@@ -158,6 +159,7 @@ impl Equilibrium {
             iterations,
             unreliable: balance.unreliable,
             relaxed: false,
+            regularised: false,
             was_kept: false,
             was_motion: false,
             round_off: self.round_off,

@@ -119,6 +119,7 @@ mod tests {
                 iterations: Vec::new(),
                 unreliable: None,
                 relaxed: false,
+                regularised: false,
                 was_kept: false,
                 was_motion: false,
                 tolerated: 0.0,

@@ -210,11 +210,12 @@ impl Simulation {
         let UnderWay {
             equations, record, ..
         } = phase;
-        if record.relaxed > 1 {
+        if record.relaxed + record.regularised > 1 {
             watch.warning(&Warning::RelaxedOften {
                 phase: record.name.clone(),
                 relaxed: record.relaxed - record.viscous,
                 viscous: record.viscous,
+                regularised: record.regularised,
             });
         }
         if record.tolerated > 1 {

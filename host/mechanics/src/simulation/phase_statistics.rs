@@ -34,6 +34,9 @@ pub struct PhaseRecord {
     /// Those of them that viscous control did.
     #[serde(default)]
     pub viscous: usize,
+    /// Steps that regularised corrections led to equilibrium.
+    #[serde(default)]
+    pub regularised: usize,
     /// Steps whose residual was tolerated above the tolerance.
     pub tolerated: usize,
     /// The largest of these residuals, relative.

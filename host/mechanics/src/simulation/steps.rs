@@ -278,6 +278,7 @@ impl Simulation {
             record.unsettled = record.unsettled.max(above.unwrap_or(0.0));
         }
         record.round_off = record.round_off.max(success.round_off);
+        record.regularised += usize::from(success.regularised);
         let tolerance = self.problem.settings.force_tolerance;
         let scale = success.scales.iter().copied().fold(0.0, f64::max);
         let residual = success.iterations.last().map_or(0.0, |last| last.residual);

@@ -86,6 +86,8 @@ pub enum Warning {
         relaxed: usize,
         /// Steps under viscous control.
         viscous: usize,
+        /// Steps with regularised corrections.
+        regularised: usize,
     },
     /// Number of steps of a phase with tolerated residuals.
     ToleratedOften {
@@ -204,7 +206,8 @@ impl fmt::Display for Warning {
                 phase,
                 relaxed,
                 viscous,
-            } => motions(f, phase, *relaxed, *viscous),
+                regularised,
+            } => motions(f, phase, [*relaxed, *viscous, *regularised]),
             Self::ToleratedOften {
                 phase,
                 steps,
@@ -311,29 +314,21 @@ fn by_force(f: &mut fmt::Formatter<'_>, phase: &str, steps: usize, open: &Open) 
     )
 }
 
-/// Relaxed steps from which on regularised corrections are proposed.
-const MANY: usize = 10;
-const REGULARISE: &str = ". `regularisation = true` in [solver] often needs a quarter of the iterations, with loads up to \
-                          4 % lower (experimental)";
-
-fn motions(f: &mut fmt::Formatter<'_>, phase: &str, relaxed: usize, viscous: usize) -> fmt::Result {
+fn motions(f: &mut fmt::Formatter<'_>, phase: &str, steps_by: [usize; 3]) -> fmt::Result {
     let steps = |n: usize| match n {
         1 => "1 step".to_owned(),
         n => format!("{n} steps"),
     };
-    let of = [
-        ("viscous relaxation", relaxed),
-        ("viscous control", viscous),
+    let ways = [
+        "viscous relaxation",
+        "viscous control",
+        "regularised corrections",
     ];
-    let told = of.iter().filter(|(_, n)| *n > 0);
-    let told: Vec<String> = told
-        .map(|(by, n)| format!("{by} found the equilibrium of {}", steps(*n)))
+    let told: Vec<String> = (ways.iter().zip(steps_by))
+        .filter(|(_, n)| *n > 0)
+        .map(|(by, n)| format!("{by} found the equilibrium of {}", steps(n)))
         .collect();
-    write!(f, "phase `{phase}`: {}", told.join(", "))?;
-    if relaxed >= MANY {
-        f.write_str(REGULARISE)?;
-    }
-    Ok(())
+    write!(f, "phase `{phase}`: {}", told.join(", "))
 }
 
 fn out_of_balance(f: &mut fmt::Formatter<'_>, phase: &str, share: f64) -> fmt::Result {
@@ -483,21 +478,25 @@ mod tests {
 
     #[test]
     fn motions_are_counted_by_what_they_are() {
-        let of = |relaxed, viscous| {
+        let of = |relaxed, viscous, regularised| {
             let phase = "push".to_owned();
             let warning = Warning::RelaxedOften {
                 phase,
                 relaxed,
                 viscous,
+                regularised,
             };
             warning.to_string()
         };
         let relaxed = "viscous relaxation found the equilibrium of 3 steps";
         let viscous = "viscous control found the equilibrium of 1 step";
-        assert_eq!(of(3, 0), format!("phase `push`: {relaxed}"));
-        assert_eq!(of(0, 1), format!("phase `push`: {viscous}"));
-        assert_eq!(of(3, 1), format!("phase `push`: {relaxed}, {viscous}"));
-        assert!(of(10, 0).contains("of 10 steps. `regularisation = true`"));
-        assert!(!of(9, 10).contains("regularisation"));
+        let regularised = "regularised corrections found the equilibrium of 9 steps";
+        assert_eq!(of(3, 0, 0), format!("phase `push`: {relaxed}"));
+        assert_eq!(of(0, 1, 0), format!("phase `push`: {viscous}"));
+        assert_eq!(of(3, 1, 0), format!("phase `push`: {relaxed}, {viscous}"));
+        assert_eq!(
+            of(3, 0, 9),
+            format!("phase `push`: {relaxed}, {regularised}")
+        );
     }
 }

@@ -175,6 +175,7 @@ impl Progress {
             viscous_steps: record.viscous,
             viscous_from: record.viscous_from,
             single_corrections_from: record.singly_from,
+            regularised_steps: record.regularised,
             tolerated_steps: record.tolerated,
             tolerated_residual: Some(record.tolerated_residual),
             tolerated_force: Some(record.tolerated_force),

@@ -17,8 +17,6 @@ use law::Operator;
 /// increment: what moves on is a mechanism, however small its residual.
 const LAST: usize = 5;
 const STILL_MOVES: f64 = 0.1;
-/// After regularised corrections a residual is tolerated up to this multiple of the tolerance.
-const JUST_ABOVE: f64 = 1.5;
 /// It is not tolerated if the displacement increments are more than this many times those at the start of the
 /// iterations.
 const FAR: f64 = 5.0;
@@ -39,8 +37,9 @@ pub(super) struct LoadControl {
     least: Option<(Vec<f64>, f64)>,
     /// Size of the first iterate's displacement increments.
     predicted: Option<f64>,
-    /// No correction can be computed for the present iterate: its tangent matrix is singular.
-    is_singular: bool,
+    /// No correction leads on from the present iterate: its tangent matrix is singular, or regularised corrections
+    /// stand still.
+    is_stuck: bool,
 }
 
 impl LoadControl {
@@ -63,7 +62,7 @@ impl LoadControl {
             viscous: Viscous::new(newton.settings, is_expected),
             least: None,
             predicted: None,
-            is_singular: false,
+            is_stuck: false,
         }
     }
 
@@ -92,7 +91,7 @@ impl Control for LoadControl {
             None => match self.predicted(newton) {
                 // What lies ahead may have a stiffness all the same.
                 Err(failure) if failure.is_singular() && self.viscous.is_at_hand() => {
-                    self.is_singular = true;
+                    self.is_stuck = true;
                     let still = vec![0.0; self.task.external.len()];
                     newton.completed(still, &self.task.prescribed)
                 }
@@ -145,6 +144,9 @@ impl Control for LoadControl {
         state: &State,
         iterations: &mut Vec<Iteration>,
     ) -> Result<State, StepFailure> {
+        if self.regularised.has_begun() && self.regularised.is_over(newton.settings, iterations) {
+            self.give_way();
+        }
         if !self.regularised.has_begun()
             && let Some(state) = self.relieved(newton, state, iterations)?
         {
@@ -157,11 +159,12 @@ impl Control for LoadControl {
                 }
                 if self.may_regularise() && !self.regularised.is_beyond() {
                     self.regularised.has_tried_newton(false);
-                    self.regularised
-                        .take_over(newton, &self.task, state, iterations)?;
-                    return self.regularised_correction(newton, state, iterations);
+                    match self.regularised_from_least(newton, state, iterations) {
+                        Err(failure) if failure.is_singular() => {}
+                        corrected => return corrected,
+                    }
                 }
-                self.is_singular = true;
+                self.give_way();
                 self.relieved(newton, state, iterations)?.ok_or(failure)
             }
             corrected => corrected,
@@ -182,11 +185,8 @@ impl Control for LoadControl {
     }
 
     fn is_over(&self, newton: &Newton<'_>, iterations: &[Iteration]) -> bool {
-        if self.regularised.has_begun() {
-            let most = newton.settings.max_iterations;
-            return self.regularised.is_over(most, iterations);
-        }
-        newton.is_over(self.series(iterations))
+        // Relaxation follows regularised corrections.
+        !self.regularised.has_begun() && newton.is_over(self.series(iterations))
     }
 
     fn has_settled(&self, newton: &mut Newton<'_>, state: &State) -> bool {
@@ -217,10 +217,7 @@ impl Control for LoadControl {
         let last = iterations.len().saturating_sub(LAST);
         let corrections = iterations[last..].iter().filter_map(|i| i.correction);
         let largest = corrections.fold(0.0, f64::max);
-        let mut tolerated = newton.settings.tolerated_residual;
-        if self.regularised.has_begun() {
-            tolerated = tolerated.min(JUST_ABOVE * newton.settings.force_tolerance);
-        }
+        let tolerated = newton.settings.tolerated_residual;
         let Some((increment, _)) = self.least.take().filter(|(_, least)| *least <= tolerated)
         else {
             return Ok(None);
@@ -229,8 +226,8 @@ impl Control for LoadControl {
         if largest > STILL_MOVES || !newton.settings.method.is_newton() {
             return Ok(None);
         }
-        // Regularised corrections are small along a mechanism too.
-        if self.regularised.has_begun()
+        // Corrections with a share of the elastic stiffness are small along a mechanism too.
+        if self.regularised.has_given_way
             && newton_leaves(newton, &self.task, &increment)? > STILL_MOVES
         {
             return Ok(None);
@@ -271,7 +268,7 @@ impl LoadControl {
         state: &State,
         iterations: &mut Vec<Iteration>,
     ) -> Result<Option<State>, StepFailure> {
-        let is_singular = std::mem::take(&mut self.is_singular);
+        let is_singular = std::mem::take(&mut self.is_stuck);
         let from = (state.increment.as_slice(), is_singular);
         let reached = self.viscous.relieve(newton, &self.task, from, iterations)?;
         Ok(reached.map(|(increment, balance)| State {
@@ -292,15 +289,7 @@ impl LoadControl {
             return self.regularised_correction(newton, state, iterations);
         }
         if self.may_regularise() && self.regularised.is_due(self.series(iterations)) {
-            let increment = self.least.as_ref().map(|(increment, _)| increment.clone());
-            let at = (
-                increment.unwrap_or_else(|| state.increment.clone()),
-                state.rise,
-            );
-            let state = self.evaluate(newton, at, Operator::None)?;
-            self.regularised
-                .take_over(newton, &self.task, &state, iterations)?;
-            return self.regularised_correction(newton, &state, iterations);
+            return self.regularised_from_least(newton, state, iterations);
         }
         if let Some(acceleration) = &self.acceleration {
             newton.kept.stalls = if newton.is_slow() {
@@ -339,9 +328,23 @@ impl LoadControl {
         Ok(next)
     }
 
+    /// Leaves the rest of the step to viscous relaxation. Regularised corrections are small along a mechanism too: what
+    /// they led to is not tolerated.
+    fn give_way(&mut self) {
+        if self.regularised.has_begun() {
+            self.least = None;
+        }
+        self.regularised.give_way();
+        self.is_stuck = true;
+    }
+
     /// Whether regularised corrections may take over.
     fn may_regularise(&self) -> bool {
-        self.regularises && self.acceleration.is_none() && self.viscous.relaxes()
+        self.regularises
+            && !self.regularised.has_given_way
+            && self.acceleration.is_none()
+            && self.viscous.relaxes()
+            && self.viscous.is_at_hand()
     }
 
     /// The state that a whole Newton correction leads to or, if that is not near enough, a regularised one.
@@ -381,6 +384,24 @@ impl LoadControl {
         self.regularised
             .take_over(newton, &self.task, state, iterations)?;
         self.regularised_correction(newton, state, iterations)
+    }
+
+    /// The state that a regularised correction leads to from the iterate with the least residual or, without one, from
+    /// this one.
+    fn regularised_from_least(
+        &mut self,
+        newton: &mut Newton<'_>,
+        state: &State,
+        iterations: &mut Vec<Iteration>,
+    ) -> Result<State, StepFailure> {
+        let increment = match &self.least {
+            Some((increment, _)) if !self.regularised.has_begun() => increment.clone(),
+            _ => state.increment.clone(),
+        };
+        let state = self.evaluate(newton, (increment, state.rise), Operator::None)?;
+        self.regularised
+            .take_over(newton, &self.task, &state, iterations)?;
+        self.regularised_correction(newton, &state, iterations)
     }
 
     /// The state that a regularised correction leads to.

@@ -19,6 +19,7 @@
 use crate::equilibrium::newton::{
     Acceleration, Control, Correction, Iteration, Newton, State, StepFailure, Task, dot, norm,
 };
+use crate::settings::Settings;
 use law::Operator;
 
 /// α.
@@ -46,6 +47,12 @@ const HELD: f64 = 1.0;
 /// Regularised corrections of a step, and those without a gain of a tenth that are a standstill.
 const MOST: usize = 80;
 const STANDSTILL: usize = 60;
+/// The residual falls too slowly if at its rate over this many corrections it would not meet its tolerance within those
+/// that are left to the step.
+const WINDOW: usize = 12;
+/// A body moves on as a mechanism if so many corrections are all larger than this, relative to the increment, without a
+/// gain of a tenth.
+const STILL_MOVES: f64 = 0.1;
 const GAIN: f64 = 0.9;
 
 /// Regularised iterations of a step.
@@ -67,6 +74,8 @@ pub(super) struct Regularised {
     since: Option<usize>,
     /// The regularised matrix was singular.
     is_beyond: bool,
+    /// Viscous relaxation leads on in this step.
+    pub(super) has_given_way: bool,
     /// The present state is an equilibrium by the rate of the corrections.
     pub(super) has_settled: bool,
 }
@@ -84,8 +93,15 @@ impl Regularised {
             is_expected,
             since: None,
             is_beyond: false,
+            has_given_way: false,
             has_settled: false,
         }
+    }
+
+    /// Leaves the rest of the step to viscous relaxation.
+    pub(super) fn give_way(&mut self) {
+        (self.since, self.has_given_way) = (None, true);
+        self.has_settled = false;
     }
 
     /// Whether Newton corrections are taken whole or not at all.
@@ -158,8 +174,8 @@ impl Regularised {
         }
     }
 
-    /// Whether they have come to their end.
-    pub(super) fn is_over(&self, most: Option<usize>, iterations: &[Iteration]) -> bool {
+    /// Whether they have come to their end: too many, a standstill, or a residual that falls too slowly.
+    pub(super) fn is_over(&self, settings: &Settings, iterations: &[Iteration]) -> bool {
         let Some(series) = self.since.and_then(|since| iterations.get(since..)) else {
             return false;
         };
@@ -167,7 +183,21 @@ impl Regularised {
             let (before, after) = series.split_at(series.len() - STANDSTILL);
             !before.is_empty() && least(after) > GAIN * least(before)
         };
-        series.len() >= most.unwrap_or(MOST) || series.len() > STANDSTILL && stands_still()
+        let most = settings.max_iterations.unwrap_or(MOST);
+        let is_mechanism = || {
+            let (before, after) = series.split_at(series.len() - WINDOW);
+            let moves = |i: &Iteration| i.correction.is_some_and(|size| size > STILL_MOVES);
+            after.iter().all(moves) && least(after) > GAIN * least(before)
+        };
+        let is_too_slow = || {
+            let (before, after) = series.split_at(series.len() - WINDOW);
+            let left = least(after) / settings.force_tolerance;
+            let fall = (least(before) / least(after)).ln() / WINDOW as f64;
+            left > 1.0 && left.ln() > fall.max(0.0) * (most - series.len()) as f64
+        };
+        series.len() >= most
+            || series.len() > STANDSTILL && stands_still()
+            || series.len() >= 2 * WINDOW && (is_too_slow() || is_mechanism())
     }
 
     /// The state that the next correction leads to.
@@ -235,10 +265,10 @@ impl Regularised {
 
     /// Whether corrections to come will add up to no more than this share of the increment.
     fn is_near(&self, taken: &Iteration, tolerance: f64) -> bool {
-        let Some([first, _, last]) = self.sizes.last_chunk::<3>() else {
+        let Some([first, _, _, last]) = self.sizes.last_chunk::<4>() else {
             return false;
         };
-        let rate = (last / first).sqrt();
+        let rate = (last / first).cbrt();
         let left = (rate / (1.0 - rate)).max(1.0);
         rate < 1.0
             && taken

@@ -62,6 +62,8 @@ pub struct StepSuccess {
     pub unreliable: Option<String>,
     /// Newton iterations alone had come to a standstill; viscous relaxation led to this state.
     pub relaxed: bool,
+    /// Regularised corrections led to this state.
+    pub regularised: bool,
     /// Corrections with the matrix of an earlier step led to it.
     pub was_kept: bool,
     /// It took many viscous steps.
