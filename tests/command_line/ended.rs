@@ -1,7 +1,6 @@
 //! Laws that end the process they are called in, in every way there is, or change it: the command
 //! ends with exit code 3 and names the place, and every row in equilibrium is kept.
 #![cfg(target_os = "linux")]
-#![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use crate::program::{DONE, Outcome, PLUGIN_TROUBLE, Place};
 use crate::troubled;

@@ -1,6 +1,7 @@
 //! What became of a command.
 #![expect(
     clippy::missing_panics_doc,
+    clippy::return_self_not_must_use,
     clippy::unwrap_used,
     reason = "part of the tests, which panic to fail"
 )]
