@@ -134,8 +134,7 @@ fn below(folder: &Path, prefix: &str, names: &mut BTreeSet<String>) {
 #[test]
 fn a_project_in_rust_carries_the_whole_contract() {
     let place = TempDir::new().unwrap();
-    let written = pilum(place.path(), &["new-law", "slider", "--language", "rust"]);
-    assert_eq!(written.code, Some(0), "{}", written.stderr);
+    pilum(place.path(), &["new-law", "slider", "--language", "rust"]).ended(0);
     for folder in ["abi/src", "abi/bridges/src"] {
         let (theirs, ours) = (place.path().join("slider").join(folder), repository(folder));
         let (mut carried, mut here) = (BTreeSet::new(), BTreeSet::new());
@@ -159,7 +158,7 @@ fn no_project_names_this_machine() {
         for kind in ["interface", "continuum"] {
             let place = TempDir::new().unwrap();
             let arguments = ["new-law", "slider", "--language", language, "--kind", kind];
-            assert_eq!(pilum(place.path(), &arguments).code, Some(0));
+            pilum(place.path(), &arguments).ended(0);
             let mut names = BTreeSet::new();
             below(&place.path().join("slider"), "", &mut names);
             for name in names {

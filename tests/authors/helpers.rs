@@ -43,14 +43,7 @@ fn a_library_holds_several_laws() {
         let built = law.build(Hypothesis::Interface2d, &[]).unwrap();
         let state = built.initial_state(1, (&[0.0; 2], Strided::rows(2)));
         assert_eq!(state.unwrap(), [7.0]);
-        let outcome = pilum(folder.path(), &["check", file.to_str().unwrap()]);
-        assert_eq!(
-            outcome.code,
-            Some(0),
-            "{}{}",
-            outcome.stdout,
-            outcome.stderr
-        );
+        pilum(folder.path(), &["check", file.to_str().unwrap()]).ended(0);
     }
 }
 
@@ -137,7 +130,7 @@ fn many_internal_variables_are_refused_or_carried() {
             outcome.stdout
         );
         if let Some(says) = says {
-            assert!(outcome.stdout.contains(says), "{}", outcome.stdout);
+            outcome.prints(says);
         }
     }
 }
@@ -210,8 +203,8 @@ fn too_many_of_anything_in_fortran_is_said() {
         let outcome = pilum(
             folder.path(),
             &["check", "./libtwo_laws.so", "--only=create-works"],
-        );
-        assert_eq!(outcome.code, Some(3), "{}", outcome.stdout);
-        assert!(outcome.stdout.contains(says), "{}", outcome.stdout);
+        )
+        .ended(3);
+        outcome.prints(says);
     }
 }

@@ -44,11 +44,10 @@ fn leaves_what_is_there_alone() {
             "mine/slider",
         ],
     ] {
-        let outcome = pilum(place.path(), arguments);
-        assert_eq!(outcome.code, Some(1), "{}", outcome.stderr);
+        pilum(place.path(), arguments).ended(1);
     }
     let outcome = pilum(place.path(), &["new-law", "slider", "--language", "c"]);
-    assert!(outcome.says("slider exists already"), "{}", outcome.stderr);
+    outcome.shows("slider exists already");
     assert_eq!(
         fs::read_dir(place.path().join("slider")).unwrap().count(),
         0
@@ -60,21 +59,15 @@ fn leaves_what_is_there_alone() {
 #[test]
 fn lists_the_languages() {
     let place = TempDir::new().unwrap();
-    let outcome = pilum(place.path(), &["new-law", "slider", "--language", "cobol"]);
-    assert_eq!(outcome.code, Some(1));
-    assert!(outcome.says("rust, c, cpp, fortran"), "{}", outcome.stderr);
+    let outcome = pilum(place.path(), &["new-law", "slider", "--language", "cobol"]).ended(1);
+    outcome.shows("rust, c, cpp, fortran");
 }
 
 #[test]
 fn writes_where_it_is_told() {
     let place = TempDir::new().unwrap();
     let arguments = ["new-law", "slider", "--language", "c", "--out", "deep/down"];
-    let outcome = pilum(place.path(), &arguments);
-    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
-    assert!(
-        outcome.stdout.contains("cd deep/down"),
-        "{}",
-        outcome.stdout
-    );
+    let outcome = pilum(place.path(), &arguments).ended(0);
+    outcome.prints("cd deep/down");
     assert!(place.path().join("deep/down/law.c").is_file());
 }

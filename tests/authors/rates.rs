@@ -148,19 +148,12 @@ fn a_law_by_duals_passes_the_checks() {
     let law = SearchPath::new(&[]).law("sensitive_joint").unwrap();
     let file = law.library().path().to_str().unwrap();
     let folder = tempfile::TempDir::new().unwrap();
-    let outcome = pilum(folder.path(), &["check", file]);
-    assert_eq!(
-        outcome.code,
-        Some(0),
-        "{}{}",
-        outcome.stdout,
-        outcome.stderr
-    );
+    let outcome = pilum(folder.path(), &["check", file]).ended(0);
     let line = outcome
         .stdout
         .lines()
         .find(|line| line.contains("rates-match-differences"));
     assert!(line.unwrap().contains("passed"), "{}", outcome.stdout);
     let page = pilum(folder.path(), &["laws", "sensitive_joint"]);
-    assert!(page.stdout.contains("; rates"), "{}", page.stdout);
+    page.prints("; rates");
 }

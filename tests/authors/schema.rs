@@ -10,8 +10,7 @@ use tempfile::TempDir;
 
 fn validator(kind: &str) -> Validator {
     let place = TempDir::new().unwrap();
-    let outcome = pilum(place.path(), &["schema", kind]);
-    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let outcome = pilum(place.path(), &["schema", kind]).ended(0);
     let schema: Value = serde_json::from_str(&outcome.stdout).unwrap();
     Validator::new(schema)
 }

@@ -19,12 +19,12 @@ use tempfile::TempDir;
 const CASE: &str = r#"
 law_path = ["."]
 analysis = "plane_strain"
+supports = [{ line = "bottom", fixed = ["x", "y"] }]
 [mesh]
 columns = [{ n = 4, to = 1.0 }]
 rows = [{ n = 2, to = 0.5 }, { n = 2, to = 1.0 }]
 lines = { bottom = { y = 0.0 }, joint = { y = 0.5 }, top = { y = 1.0 } }
-[[mesh.region]]
-group = "blocks"
+region = [{ group = "blocks" }]
 [laws.block]
 law = "elastic"
 parameters = { young_modulus = 1e5, poisson_ratio = 0.2 }
@@ -38,9 +38,6 @@ law = "block"
 formulation = "zero_thickness"
 line = "joint"
 law = "joint"
-[[supports]]
-line = "bottom"
-fixed = ["x", "y"]
 [probes]
 shear = { group = "joint", quantity = "traction_t" }
 [solver]
@@ -112,8 +109,7 @@ fn built(variant: &Variant, folder: &Path) -> Option<std::path::PathBuf> {
 /// The mean shear traction at the end, iterations of all phases, and what was said.
 fn solved(folder: &Path) -> (f64, u64, String) {
     std::fs::write(folder.join("case.toml"), CASE).unwrap();
-    let outcome = pilum(folder, &["run", "case.toml", "--out", "results"]);
-    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    let outcome = pilum(folder, &["run", "case.toml", "--out", "results"]).ended(0);
     let history = std::fs::read_to_string(folder.join("results/history.csv")).unwrap();
     let mut lines = history.lines();
     let column = lines
@@ -163,14 +159,7 @@ fn every_kind_of_tangent_is_solved() {
         // At the kink where slip begins differences lie between both sides.
         assert!(2 * iterations <= 3 * few, "{name}: {iterations}, {few}");
         let path = file.to_str().unwrap();
-        let outcome = pilum(folder.path(), &["check", path]);
-        assert_eq!(
-            outcome.code,
-            Some(0),
-            "{}{}",
-            outcome.stdout,
-            outcome.stderr
-        );
+        pilum(folder.path(), &["check", path]).ended(0);
         let page = pilum(
             folder.path(),
             &["laws", "coulomb_joint_c", "--law-path", "."],

@@ -1,13 +1,8 @@
 //! The calibrations in `cases/`.
 
 use crate::{holds, number, run};
-use std::path::{Path, PathBuf};
-
-fn case(file: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../cases")
-        .join(file)
-}
+use tests::place::case;
+use tests::tolerance::near;
 
 /// The truth that `measure.py` computes the points with.
 const MEPI: [(&str, f64); 5] = [
@@ -31,11 +26,7 @@ fn mepi_from_three_shear_boxes() {
     let stage = &outcome.stages[0];
     assert_eq!(stage.n_residuals, 168);
     // χ² with 163 degrees of freedom, within three of its standard deviations √(2/163).
-    assert!(
-        (stage.variance - 1.0).abs() < 3.0 * (2.0_f64 / 163.0).sqrt(),
-        "{}",
-        stage.variance
-    );
+    near(stage.variance, 1.0, 3.0 * (2.0_f64 / 163.0).sqrt());
     // The test that was not fitted is met as well as the others.
     let predicted = &outcome.tests[3];
     assert!(predicted.is_predicted);
@@ -119,8 +110,5 @@ fn friction_and_contraction_of_a_measured_interface() {
     let ends = |values: &[f64]| sum(&values[..10]) - sum(&values[values.len() - 10..]);
     let contraction = (ends(&sigma) / -ends(&slip) / 1000.0).atan().to_degrees();
     let found = outcome.values[number(&outcome, "contraction_angle")];
-    assert!(
-        (found / contraction - 1.0).abs() < 0.1,
-        "{found}, {contraction}"
-    );
+    near(found / contraction, 1.0, 0.1);
 }

@@ -8,6 +8,7 @@ use crate::{computed, number, run, write_points};
 use runs::calibration::{FittedCurve, Open, Outcome};
 use std::fs;
 use tempfile::TempDir;
+use tests::tolerance::near;
 
 fn joint(stress: f64) -> String {
     format!(
@@ -147,10 +148,7 @@ fn a_prediction_has_the_errors_of_all_stages() {
     assert_eq!(predicted.deviations.len(), 6);
     for ((x, _), deviation) in predicted.curve.points.iter().zip(&predicted.deviations) {
         let expected = 0.5 * (1.0 + x * x / squares).sqrt();
-        assert!(
-            (deviation.unwrap() / expected - 1.0).abs() < 1e-4,
-            "{x}: {deviation:?} {expected}"
-        );
+        near(deviation.unwrap() / expected, 1.0, 1e-4);
     }
 }
 
@@ -227,10 +225,7 @@ fn weights_are_no_information() {
     };
     let (one, both) = (error(&tests[1..]), error(&tests));
     for (one, both) in one.iter().zip(both) {
-        assert!(
-            (both / one / 0.82_f64.sqrt() - 1.0).abs() < 0.01,
-            "{one} {both}"
-        );
+        near(both / one / 0.82_f64.sqrt(), 1.0, 0.01);
     }
 }
 

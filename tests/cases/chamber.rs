@@ -5,16 +5,10 @@
 //! Asserts   equality with an independent program; K_l after confinement; friction; equilibrium.
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use tests::case::{column, run_case, table};
-use tests::tolerance::EQUILIBRIUM;
-
-fn case(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../cases")
-        .join(name)
-}
+use tests::place::case;
+use tests::tolerance::{EQUILIBRIUM, near};
 
 fn run(name: &str) -> TempDir {
     let folder = TempDir::new().unwrap();
@@ -117,11 +111,7 @@ fn assert_friction_and_balance(name: &str) {
     let sigma = *column(&history, "sigma_n_shaft").last().unwrap();
     let tan_delta = 35.0_f64.to_radians().tan();
     // All points of the probe slide; the law returns to τ = σ tan δ to round-off.
-    assert!(
-        (tau / sigma / tan_delta - 1.0).abs() < EQUILIBRIUM,
-        "{}",
-        tau / sigma
-    );
+    near(tau / sigma / tan_delta, 1.0, EQUILIBRIUM);
     let loading = |row: &&BTreeMap<String, String>| row["phase"] == "loading";
     let q_t: Vec<f64> = table(&history)
         .iter()

@@ -7,15 +7,10 @@
 use crate::variant::{Run, assert_close, finished};
 use input::Case;
 use runs::point::run_file_variants;
-use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use tests::case::column;
-
-fn case(file: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../cases")
-        .join(file)
-}
+use tests::place::case;
+use tests::tolerance::near;
 
 /// Strain and stress along the axis in a driver.
 fn axial(driver: &str, variant: Option<&str>) -> [Vec<f64>; 2] {
@@ -140,11 +135,7 @@ fn the_ground_hands_its_overconsolidation_to_the_law() {
             .value
     };
     for (name, given) in [("ocr", 2.0), ("pop", 10.0)] {
-        assert!(
-            (value(name) - given).abs() < 1e-12,
-            "{name}: {}",
-            value(name)
-        );
+        near(value(name), given, 1e-12);
     }
     // Formula (21) of the law: σ_1c = 2 · 100 + 10 kPa, and the cap through (σ_1c, K_0 σ_1c, K_0 σ_1c).
     let stress = [-80.0, -100.0, -80.0, 0.0];

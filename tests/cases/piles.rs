@@ -7,15 +7,9 @@
 use crate::variant::{Run, assert_close, finished};
 use runs::point::run_file_variants;
 use std::f64::consts::PI;
-use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use tests::case::column;
-
-fn case(file: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../cases")
-        .join(file)
-}
+use tests::place::case;
 
 /// Settlement (mm) at a load of the head (kN) in a load test, between increments.
 fn settlement_at(run: &Run, load: f64) -> f64 {

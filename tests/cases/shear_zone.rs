@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use tempfile::TempDir;
 use tests::case::column;
-use tests::tolerance::DRIVER;
+use tests::tolerance::{DRIVER, near};
 
 const THICKNESS: f64 = 5e-3;
 const SIGMA: f64 = 100.0;
@@ -51,10 +51,7 @@ fn mohr_coulomb() -> Tests {
 }
 
 fn assert_near(found: f64, expected: f64, tolerance: f64) {
-    assert!(
-        (found - expected).abs() <= tolerance * expected.abs(),
-        "{found} instead of {expected}"
-    );
+    near(found, expected, tolerance * expected.abs());
 }
 
 #[test]

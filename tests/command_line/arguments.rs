@@ -80,13 +80,9 @@ fn refuses_results_where_none_can_be_written() {
         place.write("case.toml", CASE);
         let outcome = place.run(&["run", "case.toml", "--out", out]);
         assert_eq!(outcome.code, Some(BAD_INPUT), "{out}\n{}", outcome.stderr);
-        assert!(
-            outcome.says(&format!("cannot write {out}")),
-            "{}",
-            outcome.stderr
-        );
+        outcome.shows(&format!("cannot write {out}"));
         assert_eq!(place.contents(), ["case.toml", "file"]);
-        assert_eq!(std::fs::read_to_string(place.path("file")).unwrap(), "mine");
+        assert_eq!(place.read("file"), "mine");
     }
 }
 
@@ -96,8 +92,7 @@ fn results_go_to_a_folder_named_like_the_case() {
     place.write("block/case.toml", CASE);
     place.write("other.toml", CASE);
     for (case, results) in [("block", "results/block"), ("other.toml", "results/other")] {
-        let outcome = place.run(&["run", case]);
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        place.done(&["run", case]);
         assert!(
             place.path(results).join("summary.json").is_file(),
             "{results}"

@@ -1,13 +1,12 @@
 //! Cases based on others: messages point into the file that holds the mistake.
 
-use crate::program::{BAD_INPUT, CASE, DONE, Place};
+use crate::program::{BAD_INPUT, CASE, Place};
 
 /// Runs a case file that is based on another; the message is about `at`.
 fn refused(case: &str, base: &str, at: &str, says: &str) {
     let place = Place::new();
     place.write("base.toml", base);
-    let outcome = place.run_case(case);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    let outcome = place.refused_case(case);
     for text in [at, says] {
         assert!(
             outcome.says(text),
@@ -24,8 +23,7 @@ const BASED: &str = "base = \"base.toml\"\n";
 fn keys_that_belong_to_the_whole_file_are_among_those_that_are_known() {
     let says = |case: &str, says: &str| {
         let place = Place::new();
-        let outcome = place.run_case(case);
-        assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+        let outcome = place.refused_case(case);
         assert!(
             outcome.says(says),
             "it does not say {says:?}:\n{}",
@@ -44,7 +42,7 @@ fn keys_that_belong_to_the_whole_file_are_among_those_that_are_known() {
         &variants.replacen("base =", "bsae =", 1),
         "unknown key `bsae`",
     );
-    assert!(!outcome.says("did you mean `base`?"), "{}", outcome.stderr);
+    outcome.hides("did you mean `base`?");
 }
 
 #[test]
@@ -52,13 +50,8 @@ fn a_key_that_one_variant_lacks_names_the_variant() {
     let case = format!(
         "{CASE}\n[[variant]]\nname = \"whole\"\n\n[[variant]]\nname = \"lacking\"\nlaws.other = {{ parameters = {{}} }}\n"
     );
-    let outcome = Place::new().run_case(&case);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    assert!(
-        outcome.says("missing key `law` in variant `lacking`"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = Place::new().run_case(&case).ended(BAD_INPUT);
+    outcome.shows("missing key `law` in variant `lacking`");
 }
 
 #[test]
@@ -140,6 +133,5 @@ fn folders_of_laws_are_relative_to_the_file_that_names_them() {
         "elsewhere/base.toml",
         format!("law_path = [\"laws\"]\n{CASE}"),
     );
-    let outcome = place.run_case("base = \"elsewhere/base.toml\"\n");
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done_case("base = \"elsewhere/base.toml\"\n");
 }

@@ -61,8 +61,7 @@ fn slack_is_warned_of_everywhere_and_an_offset_is_a_row() {
     let place = place();
     let slack = "slip,tau\n0.1,0.1\n0.2,-0.1\n0.3,0.1\n0.5,10.1\n0.7,19.9\n0.9,30.1\n1.1,39.9\n1.3,50.1\n1.7,59.9\n1.9,60.1\n";
     place.write("box.csv", slack);
-    let outcome = place.run(&["calibrate", "joint.toml", "--out", "out"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = place.done(&["calibrate", "joint.toml", "--out", "out"]);
     let says = "residuals are too large for noise";
     let warning = outcome.stdout.find("warning: box, traction_t: ").unwrap();
     assert!(
@@ -90,10 +89,9 @@ fn slack_is_warned_of_everywhere_and_an_offset_is_a_row() {
         .count();
     assert!(marked > 0 && marked == far.len(), "{marked}");
     let to = "noise = 0.1\noffset_x = { min = 0.0, max = 1.0 }";
-    let outcome = edited(&place, "noise = 0.1", to, &[]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = edited(&place, "noise = 0.1", to, &[]).ended(DONE);
     assert!(!outcome.stdout.contains("warning: "), "{}", outcome.stdout);
-    assert!(outcome.stdout.contains("\noffset_x of box, traction_t  "));
+    outcome.prints("\noffset_x of box, traction_t  ");
     assert!(read("parameters.csv").contains("\n\"offset_x of box, traction_t\",2.9"));
     assert!(!read("report.html").contains("not to be believed"));
     assert!(!read("parameters.toml").contains("offset"));
@@ -109,16 +107,12 @@ fn edited(place: &Place, from: &str, to: &str, more: &[&str]) -> Outcome {
 #[test]
 fn finds_what_the_points_were_made_with_and_leaves_it_in_files() {
     let place = place();
-    let outcome = place.run(&["calibrate", "joint.toml"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    for part in [
-        "shear_stiffness",
-        "95 % interval",
-        "[parameters]",
-        "results in results/calibrate_joint",
-    ] {
-        assert!(outcome.stdout.contains(part), "{part}: {}", outcome.stdout);
-    }
+    let outcome = place.done(&["calibrate", "joint.toml"]);
+    outcome
+        .prints("shear_stiffness")
+        .prints("95 % interval")
+        .prints("[parameters]")
+        .prints("results in results/calibrate_joint");
     let folder = place.path("results/calibrate_joint");
     let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
     let json: Value = serde_json::from_str(&read("calibration.json")).unwrap();
@@ -151,7 +145,7 @@ fn finds_what_the_points_were_made_with_and_leaves_it_in_files() {
     let (head, rest) = DRIVER.split_once("[parameters]").unwrap();
     let (_, tail) = rest.split_once("[initial]").unwrap();
     place.write("best.toml", format!("{head}{block}[initial]{tail}"));
-    assert_eq!(place.run(&["point", "best.toml"]).code, Some(DONE));
+    place.done(&["point", "best.toml"]);
 }
 
 #[test]
@@ -160,7 +154,7 @@ fn variants_and_settings() {
     let variants =
         format!("{FILE}\n[[variant]]\nname = \"a\"\n[[variant]]\nname = \"b\"\nconfidence = 0.5\n");
     place.write("joint.toml", variants);
-    let outcome = place.run(&[
+    let outcome = place.done(&[
         "calibrate",
         "joint.toml",
         "--out",
@@ -168,7 +162,6 @@ fn variants_and_settings() {
         "--set",
         "starts=1",
     ]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
     assert!(
         outcome.stderr.contains("start 1 of 1"),
         "{}",
@@ -184,13 +177,8 @@ fn variants_and_settings() {
     // t(6) is 2.447 at 95 % and 0.718 at 50 %.
     let ratio = width("a") / width("b");
     assert!((ratio / (2.447 / 0.718) - 1.0).abs() < 0.02, "{ratio}");
-    let outcome = place.run(&["calibrate", "joint.toml", "--variant", "c"]);
-    assert_eq!(outcome.code, Some(BAD_INPUT));
-    assert!(
-        outcome.says("there is no variant `c`"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = place.refused(&["calibrate", "joint.toml", "--variant", "c"]);
+    outcome.shows("there is no variant `c`");
 }
 
 /// What was in the folder before.
@@ -198,21 +186,15 @@ fn variants_and_settings() {
 fn a_folder_with_earlier_results() {
     let place = place();
     let run = ["calibrate", "joint.toml", "--out", "out"];
-    assert_eq!(place.run(&run).code, Some(DONE));
+    place.done(&run);
     assert!(place.path("out/profile_friction_angle.svg").is_file());
     // Figures that this one does not draw are gone.
-    let outcome = place.run(&[&run[..], &["--set", "profiles=false"]].concat());
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&[&run[..], &["--set", "profiles=false"]].concat());
     assert!(!place.path("out/profile_friction_angle.svg").exists());
     assert!(place.path("out/fit_traction_t_over_u_t.svg").is_file());
     place.write("run/history.csv", "phase,increment\n");
-    let outcome = place.run(&["calibrate", "joint.toml", "--out", "run"]);
-    assert_eq!(outcome.code, Some(BAD_INPUT));
-    assert!(
-        outcome.says("holds the results of a run"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = place.refused(&["calibrate", "joint.toml", "--out", "run"]);
+    outcome.shows("holds the results of a run");
     assert!(!place.path("run/report.html").exists());
 }
 
@@ -221,15 +203,8 @@ fn a_folder_with_earlier_results() {
 fn points_that_are_not_computed_are_left_out() {
     let place = place();
     place.write("box.csv", format!("{POINTS}2.5,60.0,\n3.0,60.0,\n"));
-    let outcome = place.run(&["calibrate", "joint.toml", "--out", "out"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(
-        outcome
-            .stdout
-            .contains("2 of 10 measured points are left out"),
-        "{}",
-        outcome.stdout
-    );
+    let outcome = place.done(&["calibrate", "joint.toml", "--out", "out"]);
+    outcome.prints("2 of 10 measured points are left out");
 }
 
 /// A law of a case is named by its table.
@@ -272,11 +247,7 @@ noise = 0.1
     let wrong = file.replace("FREE", "young_modulus = { laws = [\"soil\"] }");
     place.write("push.toml", wrong.replace("\"weight\"", "\"wait\""));
     let outcome = place.run(&["calibrate", "push.toml"]);
-    assert!(
-        outcome.says("there is no phase `wait`"),
-        "{}",
-        outcome.stderr
-    );
+    outcome.shows("there is no phase `wait`");
 }
 
 /// A calibration whose computations take long enough to be ended on the way: its result, and what it is without
@@ -304,7 +275,7 @@ const LONG: [&str; 6] = [
 /// Everything that was found.
 #[cfg(target_os = "linux")]
 fn found(place: &Place) -> String {
-    std::fs::read_to_string(place.path("out/calibration.json")).unwrap()
+    place.read("out/calibration.json")
 }
 
 /// Starts the calibration, ends it by a signal when it has kept `n` computations, and says how many it then
@@ -330,7 +301,7 @@ fn ended(place: &Place, signal: &str, n: usize) -> Option<(Option<i32>, usize, S
     }
     assert!(tests::needs::signal(signal, &child.id().to_string()));
     let code = child.wait().unwrap().code();
-    let said = std::fs::read_to_string(place.path("said")).unwrap();
+    let said = place.read("said");
     (!place.path("out/calibration.json").exists()).then(|| (code, kept(), said))
 }
 
@@ -338,8 +309,7 @@ fn ended(place: &Place, signal: &str, n: usize) -> Option<(Option<i32>, usize, S
 #[test]
 fn a_calibration_that_was_ended_goes_on_with_what_it_has_computed() {
     let undisturbed = long();
-    let outcome = undisturbed.run(&LONG);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    undisturbed.done(&LONG);
     let expected = found(&undisturbed);
     assert!(!undisturbed.path("out/computations.jsonl").exists());
     let place = long();
@@ -358,9 +328,7 @@ fn a_calibration_that_was_ended_goes_on_with_what_it_has_computed() {
         }
         before = kept;
     }
-    let outcome = place.run(&LONG);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(outcome.says("are taken over"), "{}", outcome.stderr);
+    place.done(&LONG).shows("are taken over");
     // As if nothing had happened, the number of computations included.
     assert_eq!(found(&place), expected);
     assert!(!place.path("out/computations.jsonl").exists());
@@ -376,18 +344,15 @@ fn what_was_computed_of_something_else_is_not_taken_over() {
         "driver.toml",
         DRIVER.replacen("increments = 20", "increments = 30", 1),
     );
-    let outcome = place.run(&LONG);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(outcome.says("begun anew"), "{}", outcome.stderr);
+    place.done(&LONG).shows("begun anew");
     let place = long();
     ended(&place, "KILL", 5).unwrap();
     // The noise is no part of it.
     place.write("joint.toml", FILE.replace("noise = 0.1", "noise = 0.2"));
     let outcome = place.run(&LONG);
-    assert!(outcome.says("are taken over"), "{}", outcome.stderr);
+    outcome.shows("are taken over");
     let place = long();
     ended(&place, "KILL", 5).unwrap();
-    let outcome = place.run(&[&LONG[..], &["--anew"]].concat());
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(!outcome.says("taken over"), "{}", outcome.stderr);
+    let outcome = place.done(&[&LONG[..], &["--anew"]].concat());
+    outcome.hides("taken over");
 }

@@ -1,6 +1,6 @@
 //! The file that a failed call of a law leaves behind, and its repetition.
 
-use crate::program::{BAD_INPUT, DONE, NO_EQUILIBRIUM, PLUGIN_TROUBLE, Place};
+use crate::program::{NO_EQUILIBRIUM, PLUGIN_TROUBLE, Place};
 use crate::troubled;
 
 /// A folder in which a driver has failed.
@@ -8,13 +8,8 @@ fn failed(how: &str, arguments: &[&str], code: i32) -> Option<Place> {
     let place = troubled::place("")?;
     place.write("driver.toml", troubled::driver(how));
     let point = ["point", "driver.toml", "--csv", "out.csv"];
-    let outcome = place.run(&[&point, arguments].concat());
-    assert_eq!(outcome.code, Some(code), "{}", outcome.stderr);
-    assert!(
-        outcome.says("pilum replay out.failure.toml"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = place.run(&[&point, arguments].concat()).ended(code);
+    outcome.shows("pilum replay out.failure.toml");
     Some(place)
 }
 
@@ -23,7 +18,7 @@ fn a_failed_driver_leaves_its_call() {
     let Some(place) = failed("cut", &[], NO_EQUILIBRIUM) else {
         return;
     };
-    let text = std::fs::read_to_string(place.path("out.failure.toml")).unwrap();
+    let text = place.read("out.failure.toml");
     let capsule: toml::Table = toml::from_str(&text).unwrap();
     assert_eq!(capsule["law"]["id"].as_str(), Some("troubled"));
     assert_eq!(capsule["law"]["version"].as_str(), Some("1.0"));
@@ -46,8 +41,7 @@ fn a_failed_driver_leaves_its_call() {
         "driver.toml",
         troubled::driver("cut").replace("limit = 1.0e-3", "limit = 1.0"),
     );
-    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&["point", "driver.toml", "--csv", "out.csv"]);
     assert!(!place.path("out.failure.toml").exists());
 }
 
@@ -57,7 +51,7 @@ fn a_replay_repeats_the_call_and_finds_the_limit() {
         return;
     };
     // A longer increment, of which half succeeds.
-    let text = std::fs::read_to_string(place.path("out.failure.toml")).unwrap();
+    let text = place.read("out.failure.toml");
     let mut capsule: toml::Table = toml::from_str(&text).unwrap();
     let zero: toml::Table = toml::from_str("n = 0.0\nt = 0.0").unwrap();
     let end: toml::Table = toml::from_str("n = 0.0\nt = 2e-3").unwrap();
@@ -68,37 +62,18 @@ fn a_replay_repeats_the_call_and_finds_the_limit() {
         &["replay", "half.toml"][..],
         &["replay", "half.toml", "--in-process"],
     ] {
-        let outcome = place.run(arguments);
-        assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
-        for text in [
-            "as recorded: `cut step`",
-            "the limit is exceeded",
-            "a fraction 0.500000000000 of the increment succeeds",
-            "tangent at that fraction of the increment: at most",
-        ] {
-            assert!(
-                outcome.stdout.contains(text),
-                "{text:?}\n{}",
-                outcome.stdout
-            );
-        }
+        let outcome = place.run(arguments).ended(NO_EQUILIBRIUM);
+        outcome
+            .prints("as recorded: `cut step`")
+            .prints("the limit is exceeded")
+            .prints("a fraction 0.500000000000 of the increment succeeds")
+            .prints("tangent at that fraction of the increment: at most");
     }
     // With another limit the call succeeds, with the values of the elastic line.
-    let text = std::fs::read_to_string(place.path("half.toml")).unwrap();
+    let text = place.read("half.toml");
     place.write("free.toml", text.replace("limit = 0.001", "limit = 1.0"));
-    let outcome = place.run(&["replay", "free.toml"]);
-    assert_eq!(
-        outcome.code,
-        Some(DONE),
-        "{}\n{}",
-        outcome.stdout,
-        outcome.stderr
-    );
-    assert!(
-        outcome
-            .stdout
-            .contains("the call succeeds; it is recorded as `cut step`")
-    );
+    let outcome = place.done(&["replay", "free.toml"]);
+    outcome.prints("the call succeeds; it is recorded as `cut step`");
     let line = outcome
         .stdout
         .lines()
@@ -111,15 +86,10 @@ fn a_replay_outlives_a_crash() {
     let Some(place) = failed("segfault", &["--isolate"], PLUGIN_TROUBLE) else {
         return;
     };
-    let outcome = place.run(&["replay", "out.failure.toml"]);
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
-    assert!(
-        outcome
-            .stdout
-            .contains("as recorded: `internal`: the law crashed: signal 11"),
-        "{}",
-        outcome.stdout
-    );
+    let outcome = place
+        .run(&["replay", "out.failure.toml"])
+        .ended(PLUGIN_TROUBLE);
+    outcome.prints("as recorded: `internal`: the law crashed: signal 11");
 }
 
 #[test]
@@ -127,14 +97,11 @@ fn a_failed_run_leaves_its_call() {
     let Some(place) = troubled::place("") else {
         return;
     };
-    let outcome = place.run_case(troubled::case("domain"));
-    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
-    assert!(
-        outcome.says("pilum replay out/failure.toml"),
-        "{}",
-        outcome.stderr
-    );
-    let text = std::fs::read_to_string(place.path("out/failure.toml")).unwrap();
+    let outcome = place
+        .run_case(troubled::case("domain"))
+        .ended(NO_EQUILIBRIUM);
+    outcome.shows("pilum replay out/failure.toml");
+    let text = place.read("out/failure.toml");
     let capsule: toml::Table = toml::from_str(&text).unwrap();
     let origin = &capsule["where"];
     assert_eq!(origin["phase"].as_str(), Some("push"));
@@ -150,18 +117,11 @@ fn a_failed_run_leaves_its_call() {
             .as_integer()
             .is_some_and(|n| (1..=9).contains(&n))
     );
-    let outcome = place.run(&["replay", "out/failure.toml"]);
-    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
-    assert!(
-        outcome.stdout.contains("as recorded: `domain`"),
-        "{}",
-        outcome.stdout
-    );
-    assert!(
-        outcome.stdout.contains("group layer, element"),
-        "{}",
-        outcome.stdout
-    );
+    let outcome = place
+        .run(&["replay", "out/failure.toml"])
+        .ended(NO_EQUILIBRIUM);
+    outcome.prints("as recorded: `domain`");
+    outcome.prints("group layer, element");
 }
 
 #[test]
@@ -169,11 +129,10 @@ fn refuses_what_is_no_capsule() {
     let place = Place::new();
     for (text, says) in [("", "missing"), ("version = 1\nlaw = 2\n", "2")] {
         place.write("failure.toml", text);
-        let outcome = place.run(&["replay", "failure.toml"]);
-        assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+        let outcome = place.refused(&["replay", "failure.toml"]);
         assert!(outcome.says(says), "{text:?}: {}", outcome.stderr);
     }
-    assert_eq!(place.run(&["replay", "missing.toml"]).code, Some(BAD_INPUT));
+    place.refused(&["replay", "missing.toml"]);
 }
 
 #[test]
@@ -203,8 +162,7 @@ fn what_is_wrong_with_a_capsule_is_marked_in_it() {
         assert!(good.contains(from), "{from:?}");
         let place = Place::new();
         place.write("failure.toml", good.replacen(from, to, 1));
-        let outcome = place.run(&["replay", "failure.toml"]);
-        assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+        let outcome = place.refused(&["replay", "failure.toml"]);
         for text in says {
             assert!(outcome.says(text), "{to:?}, {text:?}: {}", outcome.stderr);
         }

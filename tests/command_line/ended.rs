@@ -1,7 +1,6 @@
 //! Laws that end the process they are called in, in every way there is, or change it: the command
 //! ends with exit code 3 and names the place, and every row in equilibrium is kept.
 #![cfg(target_os = "linux")]
-#![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use crate::program::{DONE, Outcome, PLUGIN_TROUBLE, Place};
 use crate::troubled;
@@ -45,9 +44,9 @@ fn run_ends_well(place: &Place, how: &str, says: &str) {
     let outcome = place.run(&["run", "case.toml", "--out", "out"]);
     let at = "phase `push`, increment 1: law `troubled`, group `layer`, element";
     assert_trouble(&outcome, &[at, "point", says, "failure.toml"], how);
-    let history = std::fs::read_to_string(place.path("out/history.csv")).unwrap();
+    let history = place.read("out/history.csv");
     assert_eq!(history.lines().count(), 3, "{how}: {history}");
-    let summary = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
+    let summary = place.read("out/summary.json");
     assert!(summary.contains("\"plugin trouble\""), "{how}: {summary}");
     for file in ["failure.toml", "report.html"] {
         assert!(place.path("out").join(file).is_file(), "{how}: {file}");
@@ -60,7 +59,7 @@ fn point_ends_well(place: &Place, how: &str, says: &str) {
     let to_file = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
     let at = "segment 1, increment 3 of 4 (3 of the file): law `troubled`";
     assert_trouble(&to_file, &[at, says, "out.failure.toml"], how);
-    let rows = std::fs::read_to_string(place.path("out.csv")).unwrap();
+    let rows = place.read("out.csv");
     assert_eq!(rows.lines().count(), 4, "{how}: {rows}");
     let to_output = place.run(&["point", "driver.toml"]);
     assert_trouble(&to_output, &[at, says], how);
@@ -124,8 +123,7 @@ fn rows_that_were_handed_out_come_once() {
         "good.toml",
         long("sleep").replace("limit = 1.0e-3", "limit = 1.0"),
     );
-    let good = place.run(&["point", "good.toml"]);
-    assert_eq!(good.code, Some(DONE), "{}", good.stderr);
+    let good = place.done(&["point", "good.toml"]);
     place.write("driver.toml", long("quiet_exit"));
     let outcome = place.run(&["point", "driver.toml"]);
     assert_trouble(&outcome, &["law `troubled`"], "quiet_exit");
@@ -149,12 +147,12 @@ fn a_copy_of_the_process_writes_nothing() {
         "(fork)",
     ];
     assert_trouble(&outcome, &says, "run");
-    let history = std::fs::read_to_string(place.path("out/history.csv")).unwrap();
+    let history = place.read("out/history.csv");
     let mut rows: Vec<&str> = history.lines().collect();
     assert!(rows.len() >= 3, "{history}");
     rows.dedup();
     assert_eq!(rows.len(), history.lines().count(), "{history}");
-    let summary = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
+    let summary = place.read("out/summary.json");
     assert!(summary.contains("\"plugin trouble\""), "{summary}");
     place.write("driver.toml", troubled::driver("fork"));
     let outcome = place.run(&["point", "driver.toml"]);
@@ -176,9 +174,8 @@ fn a_law_cannot_move_the_results() {
         "case.toml",
         troubled::case("cut").replacen("1.0e-6", "1.0", 1),
     );
-    let outcome = place.run(&["run", "case.toml", "--out", "out", "--no-probe"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(outcome.says("working folder"), "{}", outcome.stderr);
+    let outcome = place.done(&["run", "case.toml", "--out", "out", "--no-probe"]);
+    outcome.shows("working folder");
     assert!(place.path("out/history.csv").is_file());
     assert!(!place.path("elsewhere/out").exists());
     // And in the course of the run, where a driver's figures and rows are to come.
@@ -186,9 +183,8 @@ fn a_law_cannot_move_the_results() {
         return;
     };
     place.write("driver.toml", troubled::driver("folder"));
-    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    let rows = std::fs::read_to_string(place.path("out.csv")).unwrap();
+    place.done(&["point", "driver.toml", "--csv", "out.csv"]);
+    let rows = place.read("out.csv");
     assert_eq!(rows.lines().count(), 6, "{rows}");
 }
 
@@ -198,9 +194,8 @@ fn limits_and_locale_are_the_programs() {
         return;
     };
     place.write("case.toml", troubled::case("locale"));
-    let outcome = place.run(&["run", "case.toml", "--out", "out", "--no-probe"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(outcome.says("limit of file sizes"), "{}", outcome.stderr);
+    let outcome = place.done(&["run", "case.toml", "--out", "out", "--no-probe"]);
+    outcome.shows("limit of file sizes");
     let Some(plain) = troubled::place("") else {
         return;
     };
@@ -208,8 +203,7 @@ fn limits_and_locale_are_the_programs() {
         "case.toml",
         troubled::case("locale").replacen("1.0e-6", "1.0", 1),
     );
-    let outcome = plain.run(&["run", "case.toml", "--out", "out"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    plain.done(&["run", "case.toml", "--out", "out"]);
     let [a, b] = [&place, &plain].map(|p| std::fs::read(p.path("out/history.csv")).unwrap());
     assert_eq!(a, b);
 }
@@ -223,10 +217,10 @@ fn closed_files_are_not_mistaken_for_others() {
     place.write("case.toml", troubled::case("descriptors"));
     let outcome = place.run(&["run", "case.toml", "--out", "out"]);
     assert_ne!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(outcome.says("a law has closed it"), "{}", outcome.stderr);
+    outcome.shows("a law has closed it");
     let taken = std::fs::metadata(place.path("taken")).unwrap();
     assert_eq!(taken.len(), 0);
-    let history = std::fs::read_to_string(place.path("out/history.csv")).unwrap();
+    let history = place.read("out/history.csv");
     assert_eq!(history.lines().count(), 3, "{history}");
     place.write("driver.toml", troubled::driver("descriptors"));
     let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
@@ -280,6 +274,6 @@ fn rows_of_a_driver_from_a_pipe_are_kept() {
     let pipe = "mkfifo pipe; cat driver.toml > pipe & :";
     let outcome = place.run_limited(pipe, &["point", "pipe", "--csv", "out.csv"]);
     assert_trouble(&outcome, &["law `troubled`", "ended itself"], "pipe");
-    let rows = std::fs::read_to_string(place.path("out.csv")).unwrap();
+    let rows = place.read("out.csv");
     assert_eq!(rows.lines().count(), 4, "{rows}");
 }

@@ -1,7 +1,7 @@
 //! Parameters that follow from those of other laws.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
-use crate::program::{BAD_INPUT, DONE, Edit, JOINT, Place, edited, refuses};
+use crate::program::{Edit, JOINT, Place, edited, refuses};
 use serde_json::Value;
 
 /// An upright joint beside ground whose stiffness grows with the height, and what replaces values of the joint.
@@ -20,10 +20,9 @@ fn run(text: &str, settings: &[&str]) -> (Value, String) {
     let place = Place::new();
     place.write("case.toml", text);
     let arguments = ["run", "case.toml", "--out", "out"];
-    let outcome = place.run(&[&arguments[..], settings].concat());
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&[&arguments[..], settings].concat());
     let summary = std::fs::read(place.path("out/summary.json")).unwrap();
-    let history = std::fs::read_to_string(place.path("out/history.csv")).unwrap();
+    let history = place.read("out/history.csv");
     (serde_json::from_slice(&summary).unwrap(), history)
 }
 
@@ -123,82 +122,51 @@ fn moduli_are_those_of_the_ground_beside() {
 #[test]
 fn refuses_expressions_that_have_no_value() {
     refuses(
-        BAD_INPUT,
-        &[
-            (
-                "no such law",
-                &[("cohesion = 10.0", "cohesion = ^\"= 0.7 * clay.cohesion\"")],
-                &["there is no law `clay` under [laws]", "soil"],
-            ),
-            (
-                "no such parameter",
-                &[("cohesion = 10.0", "cohesion = ^\"= soil.cohesion\"")],
-                &["law `soil` has no parameter `cohesion`", "young_modulus"],
-            ),
-            (
-                "a circle",
-                &[
-                    ("cohesion = 10.0", "cohesion = \"= joint.friction_angle\""),
-                    (
-                        "friction_angle = 30.0",
-                        "friction_angle = ^\"= 2 * joint.cohesion\"",
-                    ),
-                ],
-                &["`joint.cohesion` follows from itself"],
-            ),
-            (
-                "out of bounds",
-                &[("cohesion = 10.0", "cohesion = ^\"= -soil.poisson_ratio\"")],
-                &["`joint.cohesion`: -0.3 kPa is outside [0, ∞)"],
-            ),
-            (
-                "no number",
-                &[("cohesion = 10.0", "cohesion = ^\"= sqrt(-1)\"")],
-                &["`joint.cohesion`: the expression gives NaN, no number: `sqrt(-1)` is none"],
-            ),
-            (
-                "the natural logarithm",
-                &[("cohesion = 10.0", "cohesion = ^\"= ln(2)\"")],
-                &["no function `ln`", "`log`"],
-            ),
-            (
-                "a name alone",
-                &[("cohesion = 10.0", "cohesion = ^\"= 2 * poisson_ratio\"")],
-                &["`poisson_ratio` lacks its law: `soil.poisson_ratio`"],
-            ),
-            (
-                "a hyphen",
-                &[
-                    ("[laws.soil]", "[laws.stiff-soil]"),
-                    ("law = \"soil\"", "law = \"stiff-soil\""),
-                    (
-                        "cohesion = 10.0",
-                        "cohesion = ^\"= 2 * stiff-soil.young_modulus\"",
-                    ),
-                ],
-                &["did you mean `\"stiff-soil\".young_modulus`?"],
-            ),
-            (
-                "no sign of equality",
-                &[("cohesion = 10.0", "cohesion = ^\"2*3\"")],
-                &["expected a number", "an expression begins with `=`"],
-            ),
-            (
-                "a typographic minus",
-                &[("cohesion = 10.0", "cohesion = ^\"= 3 − 2\"")],
-                &["`−` is a typographic minus: write `-`"],
-            ),
-            (
-                "not closed",
-                &[("cohesion = 10.0", "cohesion = ^\"= 2 * (1 + 3\"")],
-                &["`joint.cohesion`: the expression ends, expected `)`"],
-            ),
-            (
-                "an interface has no modulus",
-                &[("cohesion = 10.0", "cohesion = ^\"= shear_modulus(joint)\"")],
-                &["law `joint` is no law of ground here"],
-            ),
-        ],
+        r#"
+no such law
+  cohesion = 10.0 => cohesion = ^"= 0.7 * clay.cohesion"
+  there is no law `clay` under [laws]
+  soil
+no such parameter
+  cohesion = 10.0 => cohesion = ^"= soil.cohesion"
+  law `soil` has no parameter `cohesion`
+  young_modulus
+a circle
+  cohesion = 10.0 => cohesion = "= joint.friction_angle"
+  friction_angle = 30.0 => friction_angle = ^"= 2 * joint.cohesion"
+  `joint.cohesion` follows from itself
+out of bounds
+  cohesion = 10.0 => cohesion = ^"= -soil.poisson_ratio"
+  `joint.cohesion`: -0.3 kPa is outside [0, ∞)
+no number
+  cohesion = 10.0 => cohesion = ^"= sqrt(-1)"
+  `joint.cohesion`: the expression gives NaN, no number: `sqrt(-1)` is none
+the natural logarithm
+  cohesion = 10.0 => cohesion = ^"= ln(2)"
+  no function `ln`
+  `log`
+a name alone
+  cohesion = 10.0 => cohesion = ^"= 2 * poisson_ratio"
+  `poisson_ratio` lacks its law: `soil.poisson_ratio`
+a hyphen
+  [laws.soil] => [laws.stiff-soil]
+  law = "soil" => law = "stiff-soil"
+  cohesion = 10.0 => cohesion = ^"= 2 * stiff-soil.young_modulus"
+  did you mean `"stiff-soil".young_modulus`?
+no sign of equality
+  cohesion = 10.0 => cohesion = ^"2*3"
+  expected a number
+  an expression begins with `=`
+a typographic minus
+  cohesion = 10.0 => cohesion = ^"= 3 − 2"
+  `−` is a typographic minus: write `-`
+not closed
+  cohesion = 10.0 => cohesion = ^"= 2 * (1 + 3"
+  `joint.cohesion`: the expression ends, expected `)`
+an interface has no modulus
+  cohesion = 10.0 => cohesion = ^"= shear_modulus(joint)"
+  law `joint` is no law of ground here
+"#,
     );
 }
 
@@ -239,9 +207,8 @@ fn what_follows_is_varied_by_studies_and_found_by_calibrations() {
          [[parameter]]\nkey = \"laws.block.parameters.cohesion\"\nvalues = [100.0, 200.0]\n\
          [outputs]\ntau = { probe = \"tau\" }\n";
     place.write("study.toml", study);
-    let outcome = place.run(&["study", "study.toml", "--out", "study"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    let runs = std::fs::read_to_string(place.path("study/runs.csv")).unwrap();
+    place.done(&["study", "study.toml", "--out", "study"]);
+    let runs = place.read("study/runs.csv");
     let tau = runs.lines().skip(1).map(|line| line.split(',').nth(3));
     let tau: Vec<f64> = tau.map(|tau| tau.unwrap().parse().unwrap()).collect();
     for (tau, tenth) in tau.iter().zip([10.0, 20.0]) {
@@ -253,8 +220,7 @@ fn what_follows_is_varied_by_studies_and_found_by_calibrations() {
          [[test]]\nname = \"push\"\ncase = \"case.toml\"\n[[test.curve]]\nx = \"u\"\ny = \"tau\"\nphase = \"push\"\n\
          measured = { file = \"measured.csv\", x = \"u\", y = \"tau\" }\nnoise = 0.1\n";
     place.write("calibration.toml", calibration);
-    let outcome = place.run(&["calibrate", "calibration.toml", "--out", "found"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = place.done(&["calibrate", "calibration.toml", "--out", "found"]);
     let found = outcome.stdout;
     assert!(found.contains("cohesion = 145.0\n"), "{found}");
 }

@@ -1,7 +1,7 @@
 //! `--isolate`: a law that crashes, ends its process or never returns ends an increment, and not
 //! the program.
 
-use crate::program::{DONE, NO_EQUILIBRIUM, PLUGIN_TROUBLE, Place, edited};
+use crate::program::{NO_EQUILIBRIUM, PLUGIN_TROUBLE, Place, edited};
 use crate::troubled;
 
 const WAYS: [(&str, &str); 4] = [
@@ -33,9 +33,9 @@ fn a_run_ends_with_what_had_converged() {
         ] {
             assert!(outcome.says(text), "{how}: {text:?}\n{}", outcome.stderr);
         }
-        let history = std::fs::read_to_string(place.path("out/history.csv")).unwrap();
+        let history = place.read("out/history.csv");
         assert_eq!(history.lines().count(), 3, "{how}: {history}");
-        let summary = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
+        let summary = place.read("out/summary.json");
         assert!(summary.contains("\"plugin trouble\""), "{how}: {summary}");
     }
 }
@@ -48,14 +48,11 @@ fn a_copy_of_a_worker_does_not_answer_too() {
         return;
     };
     place.write("driver.toml", troubled::driver("fork"));
-    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv", "--isolate"]);
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
-    assert!(
-        outcome.says("made a copy of its process"),
-        "{}",
-        outcome.stderr
-    );
-    let rows = std::fs::read_to_string(place.path("out.csv")).unwrap();
+    let outcome = place
+        .run(&["point", "driver.toml", "--csv", "out.csv", "--isolate"])
+        .ended(PLUGIN_TROUBLE);
+    outcome.shows("made a copy of its process");
+    let rows = place.read("out.csv");
     assert_eq!(rows.lines().count(), 4, "{rows}");
 }
 
@@ -74,12 +71,8 @@ fn a_driver_ends_with_its_rows() {
             outcome.stderr
         );
         assert!(outcome.says(says), "{how}: {}", outcome.stderr);
-        assert!(
-            outcome.says("segment 1, increment 3 of 4"),
-            "{}",
-            outcome.stderr
-        );
-        let rows = std::fs::read_to_string(place.path("out.csv")).unwrap();
+        outcome.shows("segment 1, increment 3 of 4");
+        let rows = place.read("out.csv");
         assert_eq!(rows.lines().count(), 4, "{how}: {rows}");
     }
 }
@@ -95,8 +88,7 @@ fn results_are_the_same_as_in_the_process() {
     for (out, isolate) in [("here", ""), ("apart", "--isolate")] {
         let mut arguments = vec!["run", "case.toml", "--out", out];
         arguments.extend(Some(isolate).filter(|argument| !argument.is_empty()));
-        let outcome = place.run(&arguments);
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        place.done(&arguments);
     }
     for file in ["history.csv", "profile.csv"] {
         let read = |out| std::fs::read(place.path(&format!("{out}/{file}"))).unwrap();
@@ -110,9 +102,10 @@ fn refusals_of_laws_are_those_of_the_process() {
         return;
     };
     place.write("driver.toml", troubled::driver("domain"));
-    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv", "--isolate"]);
-    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
-    assert!(outcome.says("the limit is exceeded"), "{}", outcome.stderr);
+    let outcome = place
+        .run(&["point", "driver.toml", "--csv", "out.csv", "--isolate"])
+        .ended(NO_EQUILIBRIUM);
+    outcome.shows("the limit is exceeded");
 }
 
 #[test]
@@ -121,12 +114,10 @@ fn a_library_that_crashes_when_it_is_opened_is_refused() {
         return;
     };
     place.write("driver.toml", troubled::driver("cut"));
-    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv", "--isolate"]);
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
-    assert!(outcome.says("crashed: signal 11"), "{}", outcome.stderr);
-    assert!(
-        outcome.says("needed by driver.toml:1:7"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = place
+        .run(&["point", "driver.toml", "--csv", "out.csv", "--isolate"])
+        .ended(PLUGIN_TROUBLE);
+    outcome
+        .shows("crashed: signal 11")
+        .shows("needed by driver.toml:1:7");
 }

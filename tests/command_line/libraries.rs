@@ -1,26 +1,25 @@
 //! Law libraries that are missing or invalid.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
-use crate::program::{CASE, PLUGIN_TROUBLE, Place, refuses};
+use crate::program::{CASE, PLUGIN_TROUBLE, Place, refuses_in};
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::path::Path;
 use std::process::Command;
 
 #[test]
 fn says_where_it_looked_for_a_missing_law() {
-    refuses(
+    refuses_in(
+        CASE,
         PLUGIN_TROUBLE,
-        &[(
-            "misspelt",
-            &[("\"coulomb_joint\"", "^\"coulomb_join\"")],
-            &[
-                "no library with law `coulomb_join` in",
-                "deps",
-                "did you mean `coulomb_joint`?",
-                "elastic",
-                "PILUM_LAW_PATH",
-            ],
-        )],
+        r#"
+misspelt
+  "coulomb_joint" => ^"coulomb_join"
+  no library with law `coulomb_join` in
+  deps
+  did you mean `coulomb_joint`?
+  elastic
+  PILUM_LAW_PATH
+"#,
     );
 }
 
@@ -38,8 +37,9 @@ fn library_name() -> String {
 /// Runs the case: plugin trouble, said of this library.
 fn refused(place: &Place, says: &[&str]) {
     let text = CASE.replace("\"elastic\"", "\"strange\"");
-    let outcome = place.run_case(format!("law_path = [\"laws\"]\n{text}"));
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    let outcome = place
+        .run_case(format!("law_path = [\"laws\"]\n{text}"))
+        .ended(PLUGIN_TROUBLE);
     for text in [&library_name(), "case.toml:29:7"].iter().chain(says) {
         assert!(
             outcome.says(text),

@@ -47,8 +47,7 @@ fn a_list_and_a_cut_take_measured_points() {
         table("s"),
         table("t")
     );
-    let outcome = place.run_case(both);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done_case(both);
     let svg = std::fs::read_to_string(place.path("out").join("cut.svg")).unwrap();
     assert_eq!(svg.matches("<circle").count(), 6);
 }
@@ -127,14 +126,12 @@ fn points_are_moved_and_an_axis_is_reversed() {
     let mut heights = Vec::new();
     for reversed in [false, true] {
         let text = format!("{CASE}\n{figure}{table}y_reversed = {reversed}\n");
-        let outcome = place.run_case(text);
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-        let summary = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
-        let summary: Value = serde_json::from_str(&summary).unwrap();
+        place.done_case(text);
+        let summary = place.summary();
         let points = &summary["figures"][0]["measured"][0];
         assert_eq!(points["x"], serde_json::json!([0.5, 1.5]));
         assert_eq!(points["y"], serde_json::json!([4.0, 5.0]));
-        let svg = std::fs::read_to_string(place.path("out/push.svg")).unwrap();
+        let svg = place.read("out/push.svg");
         let circles = svg.split("<circle").skip(1);
         let height = |circle: &str| -> f64 {
             let at = circle.split_once("cy=\"").unwrap().1;
@@ -144,9 +141,8 @@ fn points_are_moved_and_an_axis_is_reversed() {
         heights.push(own[1] - own[0]);
     }
     assert!(heights[0] < 0.0 && heights[1] > 0.0, "{heights:?}");
-    let outcome = place.run(&["report", "out", "--print", "--out", "paper.html"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    let paper = std::fs::read_to_string(place.path("paper.html")).unwrap();
+    place.done(&["report", "out", "--print", "--out", "paper.html"]);
+    let paper = place.read("paper.html");
     for text in [
         "class=\"paper print\"",
         "title-block",

@@ -53,8 +53,7 @@ fn words<'o>(outcome: &'o Outcome, first: &str) -> Vec<&'o str> {
 
 #[test]
 fn shows_what_a_mesh_has() {
-    let outcome = shown(MESH);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = shown(MESH).ended(DONE);
     let of = |first| words(&outcome, first).join(" ");
     assert_eq!(
         of("elements"),
@@ -72,34 +71,29 @@ fn shows_what_a_mesh_has() {
         of("largest angle"),
         "largest angle 90.0°, element 11 of `ground` at (1, 0.5)"
     );
-    for note in [
-        "2 elements are of first order",
-        "1 node belongs to no triangle or quad",
-        "surfaces `ground` and `all` have 1 element in common",
-        "physical curve `stray` has 1 of 1 edges that are no sides",
-    ] {
-        assert!(outcome.stdout.contains(note), "{note}\n{}", outcome.stdout);
-    }
+    outcome
+        .prints("2 elements are of first order")
+        .prints("1 node belongs to no triangle or quad")
+        .prints("surfaces `ground` and `all` have 1 element in common")
+        .prints("physical curve `stray` has 1 of 1 edges that are no sides");
 }
 
 #[test]
 fn says_what_is_refused() {
     // A dent: the corner of the quad beyond its diagonal, with a negative Jacobian.
-    let dented = shown(&MESH.replace("4 0 1 0\n", "4 1.9 0.1 0\n"));
-    assert_eq!(dented.code, Some(BAD_INPUT), "{}", dented.stdout);
-    assert!(dented.says("1 element is degenerate: the Jacobian is not positive"));
-    assert!(dented.says("the first is element 11 of `ground`"));
-    assert!(dented.stdout.contains("largest angle"), "{}", dented.stdout);
+    let dented = shown(&MESH.replace("4 0 1 0\n", "4 1.9 0.1 0\n")).ended(BAD_INPUT);
+    dented.shows("1 element is degenerate: the Jacobian is not positive");
+    dented.shows("the first is element 11 of `ground`");
+    dented.prints("largest angle");
 
-    let left = shown(&MESH.replace("1 0 0 0\n", "1 -1 0 0\n"));
-    assert_eq!(left.code, Some(DONE), "{}", left.stderr);
+    let left = shown(&MESH.replace("1 0 0 0\n", "1 -1 0 0\n")).ended(DONE);
     let note = "1 node has x < 0, the first at (-1, 0)";
-    assert!(left.stdout.contains(note), "{}", left.stdout);
+    left.prints(note);
 
-    let solid = shown(&MESH.replace("11 3 2 1 1", "11 4 2 1 1"));
-    assert_eq!(solid.code, Some(BAD_INPUT));
-    assert!(solid.says("cannot read a.msh"), "{}", solid.stderr);
-    assert!(solid.says("line 26: an element of type 4 is a tetrahedron"));
+    let solid = shown(&MESH.replace("11 3 2 1 1", "11 4 2 1 1")).ended(BAD_INPUT);
+    solid
+        .shows("cannot read a.msh")
+        .shows("line 26: an element of type 4 is a tetrahedron");
     assert_eq!(solid.stdout, "");
 
     // Elements that are wrong are said one and all.
@@ -107,25 +101,16 @@ fn says_what_is_refused() {
         &MESH
             .replace("12 2 2 2 2 2 5 3\n", "12 2 2 2 2 2 7 3\n13 2 2 2 2 2 2 3\n")
             .replace("$Elements\n7", "$Elements\n8"),
-    );
-    assert_eq!(two.code, Some(BAD_INPUT));
-    for fault in [
-        "line 27: element 12 has the node 7, which is not among the nodes",
-        "line 28: element 13 has the node 2 twice",
-    ] {
-        assert!(two.says(fault), "{}", two.stderr);
-    }
+    )
+    .ended(BAD_INPUT);
+    two.shows("line 27: element 12 has the node 7, which is not among the nodes")
+        .shows("line 28: element 13 has the node 2 twice");
 
     let nodes = &MESH[MESH.find("$Nodes").unwrap()..MESH.find("$Elements").unwrap()];
     let format = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n";
     let elements = "$Elements\n1\n11 3 2 0 1 1 2 3 4\n$EndElements\n";
-    let nameless = shown(&format!("{format}{nodes}{elements}"));
-    assert_eq!(nameless.code, Some(BAD_INPUT), "{}", nameless.stdout);
-    assert!(
-        nameless.says("no surface has a name"),
-        "{}",
-        nameless.stderr
-    );
+    let nameless = shown(&format!("{format}{nodes}{elements}")).ended(BAD_INPUT);
+    nameless.shows("no surface has a name");
 }
 
 /// A square of two triangles of 6 nodes in a surface, fixed below; the middle of the diagonal is node 9.
@@ -228,21 +213,17 @@ fn elements_that_lie_on_each_other_are_named() {
         .replace("$Elements\n3", "$Elements\n4")
         .replace("$EndElements", "4 9 2 1 1 10 11 12 13 14 15\n$EndElements");
     let outcome = shown(&twice);
-    for part in [
-        "6 nodes are where another one is",
-        "elements 3 and 4 lie on each other",
-        "`Coherence;`",
-    ] {
-        assert!(outcome.stdout.contains(part), "{part}\n{}", outcome.stdout);
-    }
+    outcome
+        .prints("6 nodes are where another one is")
+        .prints("elements 3 and 4 lie on each other")
+        .prints("`Coherence;`");
 }
 
 #[test]
 fn shows_and_draws_the_mesh_of_a_case() {
     let place = Place::new();
     place.write("case.toml", edited(JOINT));
-    let outcome = place.run(&["mesh", "case.toml", "--draw", "mesh.svg"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = place.done(&["mesh", "case.toml", "--draw", "mesh.svg"]);
     let of = |first| words(&outcome, first).join(" ");
     assert_eq!(
         of("elements"),
@@ -252,7 +233,7 @@ fn shows_and_draws_the_mesh_of_a_case() {
     assert_eq!(of("layer"), "layer 3 2 long");
     assert_eq!(of("middle"), "middle 3 2 (0, 0.5), (2, 0.5)");
     assert!(outcome.stdout.ends_with("drawing in mesh.svg\n"));
-    let drawing = std::fs::read_to_string(place.path("mesh.svg")).unwrap();
+    let drawing = place.read("mesh.svg");
     assert_eq!(drawing.matches("<polygon").count(), 6);
     for name in ["soil", "layer", "left", "middle", "corner"] {
         assert!(drawing.contains(name), "{name}");
@@ -260,9 +241,8 @@ fn shows_and_draws_the_mesh_of_a_case() {
 
     let variants = format!("{CASE}\n[[variant]]\nname = \"a\"\n[[variant]]\nname = \"b\"\n");
     place.write("case.toml", variants);
-    let two = place.run(&["mesh", ".", "--draw", "two.svg"]);
-    assert_eq!(two.code, Some(BAD_INPUT));
-    assert!(two.says("--draw is for one mesh"), "{}", two.stderr);
+    let two = place.refused(&["mesh", ".", "--draw", "two.svg"]);
+    two.shows("--draw is for one mesh");
     let one = place.run(&["mesh", ".", "--variant", "b"]);
     assert!(one.stdout.contains("variant `b`"), "{}", one.stderr);
     assert!(!one.stdout.contains("variant `a`"), "{}", one.stdout);

@@ -6,7 +6,7 @@
     reason = "part of the tests; nodes at one place have equal bits"
 )]
 
-use crate::program::{BAD_INPUT, DONE, Place};
+use crate::program::Place;
 use std::fmt::Write as _;
 use tests::case::{column, table};
 
@@ -92,6 +92,11 @@ fn ground() -> String {
 
 const CASE: &str = r#"title = "Ground under water"
 analysis = "plane_strain"
+supports = [
+  { line = "bottom", fixed = ["x", "y"] },
+  { line = "west", fixed = ["x"] },
+  { line = "east", fixed = ["x"] },
+]
 mesh = { file = "ground.msh" }
 water = { level = 2.0 }
 
@@ -107,15 +112,6 @@ left = { formulation = "solid", law = "soil", unit_weight = 18.0, saturated_unit
 right = { formulation = "solid", law = "soil", unit_weight = 18.0, saturated_unit_weight = 20.0, initial_stress = { k_0 = 0.5 } }
 joint = { formulation = "zero_thickness", line = "between", law = "joint", active = false }
 
-[[supports]]
-line = "bottom"
-fixed = ["x", "y"]
-[[supports]]
-line = "west"
-fixed = ["x"]
-[[supports]]
-line = "east"
-fixed = ["x"]
 
 [[phase]]
 name = "ground"
@@ -166,13 +162,7 @@ fn close(value: f64, expected: f64, what: &str) {
 #[test]
 fn ground_under_water_is_what_it_is_by_hand() {
     let place = place();
-    let outcome = place.run_case(CASE);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(
-        outcome.says("phase ground: at rest within "),
-        "{}",
-        outcome.stderr
-    );
+    place.done_case(CASE).shows("phase ground: at rest within ");
     let history = place.path("out/history.csv");
     let first = |name: &str| column(&history, name)[0];
     // 1 m of 18 and 1 m of 20 kN/m³ above the line, through quads and through triangles.
@@ -227,8 +217,7 @@ fn ground_under_water_is_what_it_is_by_hand() {
 #[test]
 fn tables_and_fields_know_the_water_and_what_is_there() {
     let place = place();
-    let outcome = place.run_case(CASE);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done_case(CASE);
     let points = table(&place.path("out/points.csv"));
     for row in &points {
         let value = |name: &str| -> f64 { row[name].parse().unwrap() };
@@ -262,7 +251,7 @@ fn tables_and_fields_know_the_water_and_what_is_there() {
     );
     let fields = |number: usize| {
         let name = format!("out/fields_{number:05}.vtu");
-        std::fs::read_to_string(place.path(&name)).unwrap()
+        place.read(&name)
     };
     let array = |text: &str, name: &str| -> Vec<f64> {
         let (_, rest) = text.split_once(&format!("Name=\"{name}\"")).unwrap();
@@ -288,11 +277,10 @@ fn tables_and_fields_know_the_water_and_what_is_there() {
             .any(|value| *value > 9.0)
     );
     // The report shows triangles, and knows what is not there.
-    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    let report = place.read("out/report.html");
     assert!(report.contains("id=\"contour\"") && report.contains("\"inactive\":[2]"));
     assert!(!report.contains("left out</li>"), "something was left out");
-    let summary = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
-    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    let summary = place.summary();
     assert!(summary["phases"][0]["at_rest"].as_f64().unwrap() < 1e-9);
     assert!(summary["phases"][1]["at_rest"].is_null());
     assert_eq!(summary["probe_units"]["total"], "kPa");
@@ -301,20 +289,10 @@ fn tables_and_fields_know_the_water_and_what_is_there() {
 #[test]
 fn quantities_of_the_water_are_suggested_where_there_is_some() {
     let place = place();
-    let outcome = place.run_case(CASE.replacen("\"pore_pressure\"", "\"pore_presure\"", 1));
-    assert_eq!(outcome.code, Some(BAD_INPUT));
-    assert!(
-        outcome.says("did you mean `pore_pressure`?"),
-        "{}",
-        outcome.stderr
-    );
-    let outcome = place.run_case(CASE.replacen("water = { level = 2.0 }\n", "", 1));
-    assert_eq!(outcome.code, Some(BAD_INPUT));
-    assert!(
-        outcome.says("there is no water in the case"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = place.refused_case(CASE.replacen("\"pore_pressure\"", "\"pore_presure\"", 1));
+    outcome.shows("did you mean `pore_pressure`?");
+    let outcome = place.refused_case(CASE.replacen("water = { level = 2.0 }\n", "", 1));
+    outcome.shows("there is no water in the case");
 }
 
 /// Nothing would be left to compute: that was a run without rows.
@@ -325,14 +303,9 @@ fn a_phase_without_groups_is_refused() {
     let never_there = CASE.replace("initial_stress = { k_0 = 0.5 }", "active = false");
     for (case, phase) in [(everything, "dug"), (never_there, "ground")] {
         let place = place();
-        let outcome = place.run_case(&case);
-        assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+        let outcome = place.refused_case(&case);
         let says = format!("no group is active in phase `{phase}`");
-        assert!(
-            outcome.says(&says) && outcome.says("case.toml:"),
-            "{}",
-            outcome.stderr
-        );
+        outcome.shows(&says).shows("case.toml:");
     }
 }
 
@@ -341,8 +314,7 @@ fn a_dry_run_shows_the_model_and_computes_nothing() {
     let place = place();
     place.write("case.toml", CASE);
     let dry = ["run", "case.toml", "--out", "out", "--dry-run"];
-    let outcome = place.run(&dry);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&dry);
     let files = |folder: &str| -> Vec<String> {
         let entries = std::fs::read_dir(place.path(folder)).unwrap();
         entries
@@ -350,7 +322,7 @@ fn a_dry_run_shows_the_model_and_computes_nothing() {
             .collect()
     };
     assert_eq!(files("out"), ["report.html"]);
-    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    let report = place.read("out/report.html");
     for text in [
         "Ground under water",
         "dry run: nothing computed",
@@ -362,16 +334,10 @@ fn a_dry_run_shows_the_model_and_computes_nothing() {
         assert!(report.contains(text), "{text}");
     }
     // A run takes the folder over; a dry run leaves its results as they are.
-    assert_eq!(place.run_case(CASE).code, Some(DONE));
+    place.done_case(CASE);
     let history = std::fs::read(place.path("out/history.csv")).unwrap();
     let report = std::fs::read(place.path("out/report.html")).unwrap();
-    let outcome = place.run(&dry);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    assert!(
-        outcome.says("out holds the results of a run"),
-        "{}",
-        outcome.stderr
-    );
+    place.refused(&dry).shows("out holds the results of a run");
     assert_eq!(
         std::fs::read(place.path("out/history.csv")).unwrap(),
         history
@@ -403,9 +369,8 @@ fn a_dry_run_finds_what_a_run_would_refuse_and_leaves_nothing() {
         ),
     ] {
         place.write("case.toml", CASE.replacen(old, new, 1));
-        let outcome = place.run(&["run", "case.toml", "--out", "none", "--dry-run"]);
-        assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-        assert!(outcome.says(says), "{}", outcome.stderr);
+        let outcome = place.refused(&["run", "case.toml", "--out", "none", "--dry-run"]);
+        outcome.shows(says);
         assert!(!place.path("none").exists());
     }
 }
@@ -416,8 +381,7 @@ fn a_dry_run_of_variants_reports_each() {
     let variants =
         "\n[[variant]]\nname = \"low\"\nwater.level = 1.0\n[[variant]]\nname = \"high\"\n";
     place.write("case.toml", CASE.to_owned() + variants);
-    let outcome = place.run(&["run", "case.toml", "--out", "out", "--dry-run"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&["run", "case.toml", "--out", "out", "--dry-run"]);
     for (variant, level) in [("low", "1 m"), ("high", "2 m")] {
         let report = place.path(&format!("out/{variant}/report.html"));
         let report = std::fs::read_to_string(report).unwrap();
@@ -431,18 +395,16 @@ fn laws_that_no_group_takes_are_noted() {
     let text = crate::program::CASE.replacen("[laws.soil]", spare, 1);
     let note = "no group takes the laws `spare` of [laws]";
     let place = Place::new();
-    let outcome = place.run_case(&text);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(outcome.says(note), "{}", outcome.stderr);
+    place.done_case(&text).shows(note);
     // A file may be the base of others, which take them.
     place.write("more.toml", "base = \"case.toml\"\n");
     let outcome = place.run(&["run", "more.toml", "--out", "out"]);
-    assert!(!outcome.says("no group takes"), "{}", outcome.stderr);
+    outcome.hides("no group takes");
     let taken = format!(
         "{text}\n[[phase]]\nname = \"later\"\nincrements = 1\nlaws = {{ soil = \"spare\" }}\n"
     );
     let outcome = place.run_case(taken);
-    assert!(!outcome.says("no group takes"), "{}", outcome.stderr);
+    outcome.hides("no group takes");
 }
 
 /// Warnings of a run of the case with another law that nothing takes, and of a dry run.
@@ -456,8 +418,7 @@ fn said_of_spare(place: &Place, law: &str) -> [Vec<String>; 2] {
 
 fn said(place: &Place, file: &str, out: &str, option: &str) -> Vec<String> {
     drop(std::fs::remove_dir_all(place.path(out)));
-    let outcome = place.run(&["run", file, "--out", out, option]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = place.done(&["run", file, "--out", out, option]);
     let lines = outcome.stderr.lines();
     let of_spare = lines.filter(|line| line.contains("law `spare` of [laws]"));
     of_spare.map(str::to_owned).collect()
@@ -572,12 +533,7 @@ fn a_report_of_a_folder_without_results_says_what_is_missing() {
         ("empty", "empty has no results of a run (`history.csv`)"),
         ("nowhere", "nowhere is no folder"),
     ] {
-        let outcome = place.run(&["report", folder]);
-        assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-        assert!(
-            outcome.says(says) && outcome.says("pilum run"),
-            "{}",
-            outcome.stderr
-        );
+        let outcome = place.refused(&["report", folder]);
+        outcome.shows(says).shows("pilum run");
     }
 }

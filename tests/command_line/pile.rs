@@ -4,14 +4,19 @@
 mod messages;
 
 use crate::program::{BAD_INPUT, DONE, Place};
-use serde_json::Value;
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::path::Path;
+use tests::tolerance::near;
 
 /// A pile of two groups under ground water, wished in place, loaded and pulled.
 pub(crate) const PILE: &str = r#"
 analysis = "axisymmetric"
+supports = [
+  { line = "axis", fixed = ["r"] },
+  { line = "far", fixed = ["r"] },
+  { line = "bottom", fixed = ["r", "z"] },
+]
 water = { level = -1.3 }
 [mesh]
 origin = [0.0, -8.0]
@@ -42,15 +47,6 @@ foot = { formulation = "solid", law = "ground", unit_weight = 17.0, saturated_un
 upper = { formulation = "zero_thickness", line = "upper", law = "skin", active = false }
 lower = { formulation = "zero_thickness", line = "lower", law = "skin", active = false }
 toe = { formulation = "zero_thickness", line = "base", law = "skin", active = false }
-[[supports]]
-line = "axis"
-fixed = ["r"]
-[[supports]]
-line = "far"
-fixed = ["r"]
-[[supports]]
-line = "bottom"
-fixed = ["r", "z"]
 [[phase]]
 name = "rest"
 increments = 1
@@ -95,14 +91,8 @@ pub(crate) fn value(row: &Row, name: &str) -> f64 {
 pub(crate) fn run(text: &str) -> (Place, String) {
     let place = Place::new();
     place.write("pile.toml", text);
-    let outcome = place.run(&["run", "pile.toml", "--out", "out"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = place.done(&["run", "pile.toml", "--out", "out"]);
     (place, outcome.stdout)
-}
-
-pub(crate) fn summary(place: &Place) -> Value {
-    let text = std::fs::read(place.path("out/summary.json")).unwrap();
-    serde_json::from_slice(&text).unwrap()
 }
 
 /// Head and weight against shaft and base, in every row; the ends of the pile against both.
@@ -142,10 +132,7 @@ fn head_and_weight_are_shaft_and_base() {
     // At rest all of the weight and of the water's pressure passes through the base, none through the
     // shaft: not by the interface's own tractions, which is not there yet.
     let rest = &history[0];
-    assert!(
-        (value(rest, "pile_base_load") - ground).abs() < 1e-9 * ground,
-        "{rest:?}"
-    );
+    near(value(rest, "pile_base_load"), ground, 1e-9 * ground);
     assert!(
         value(rest, "pile_shaft_load").abs() < 1e-9 * ground,
         "{rest:?}"
@@ -229,7 +216,7 @@ fn assert_friction_holds(stations: &[Row], area: f64) {
 /// Resistances are read off the curve of the head.
 fn assert_resistances(place: &Place, stdout: &str, history: &[Row], area: f64) {
     // The criterion at 10 % of the base's width, between two increments, printed with its split.
-    let pile = &summary(place)["pile"];
+    let pile = &place.summary()["pile"];
     assert!((pile["diameter"].as_f64().unwrap() - 0.8).abs() < 1e-12);
     assert_eq!(pile["phase"], "push");
     let push: Vec<&Row> = history
@@ -240,10 +227,7 @@ fn assert_resistances(place: &Place, stdout: &str, history: &[Row], area: f64) {
         .map(|row| ["pile_settlement", "pile_head_load"].map(|name| value(row, name)));
     let expected = a[1] + (0.08 - a[0]) / (b[0] - a[0]) * (b[1] - a[1]);
     let found = pile["resistance_10_percent_diameter"].as_f64().unwrap();
-    assert!(
-        (found - expected).abs() < 1e-9 * expected,
-        "{found} for {expected}"
-    );
+    near(found, expected, 1e-9 * expected);
     assert!(
         stdout.contains(&format!("{found:.1} kN, of it shaft")),
         "{stdout}"
@@ -260,16 +244,13 @@ fn assert_resistances(place: &Place, stdout: &str, history: &[Row], area: f64) {
     let [a, b] = [push[before], push[before + 1]]
         .map(|row| ["pile_settlement", "pile_head_load"].map(|name| value(row, name)));
     let expected = a[1] + (s - a[0]) / (b[0] - a[0]) * (b[1] - a[1]);
-    assert!(
-        (davisson - expected).abs() < 1e-8 * expected,
-        "{davisson} for {expected}"
-    );
+    near(davisson, expected, 1e-8 * expected);
 }
 
 #[test]
 fn what_the_curve_does_not_reach_has_a_reason() {
     let (place, stdout) = run(&PILE.replace("z = -0.09", "z = -0.002"));
-    let pile = &summary(&place)["pile"];
+    let pile = &place.summary()["pile"];
     for name in ["10_percent_diameter", "davisson"] {
         assert!(pile[format!("resistance_{name}")].is_null(), "{pile}");
         let reason = pile[format!("resistance_{name}_reason")].as_str().unwrap();
@@ -313,16 +294,18 @@ fn both_sides_of_a_pile_in_plane_strain_count() {
         ["pile_head_load", "pile_shaft_load", "pile_base_load"].map(|name| value(row, name))
     };
     for (two, one) in last(&place).into_iter().zip(last(&one)) {
-        assert!(
-            (two - 2.0 * one).abs() < 1e-3 * two.abs(),
-            "{two} for twice {one}"
-        );
+        near(two, 2.0 * one, 1e-3 * two.abs());
     }
 }
 
 /// An elastic bar of a radius of 12.5 mm in rigid surroundings, 1 m of bond, confined by 100 kPa.
 const BAR: &str = r#"
 analysis = "axisymmetric"
+supports = [
+  { line = "outer", fixed = ["r", "z"] },
+  { line = "top", fixed = ["r", "z"] },
+  { line = "under", fixed = ["r", "z"] },
+]
 [mesh]
 columns = [{ n = 1, to = 0.0125 }, { n = 1, to = 0.05 }]
 rows = [{ n = 80, to = 1.0 }]
@@ -342,15 +325,6 @@ bond = { law = "coulomb_joint", parameters = { normal_stiffness = 1e4, shear_sti
 bar = { formulation = "solid", law = "steel", initial_stress = { stress_11 = -100.0, stress_33 = -100.0 } }
 rock = { formulation = "solid", law = "rigid", initial_stress = { stress_11 = -100.0, stress_33 = -100.0 } }
 bond = { formulation = "zero_thickness", line = "wall", law = "bond" }
-[[supports]]
-line = "outer"
-fixed = ["r", "z"]
-[[supports]]
-line = "top"
-fixed = ["r", "z"]
-[[supports]]
-line = "under"
-fixed = ["r", "z"]
 [[phase]]
 name = "pull"
 increments = 2
@@ -464,21 +438,19 @@ fn an_interface_does_not_outlive_its_pile() {
     let place = Place::new();
     let taken = "name = \"push\"\ndeactivate = [\"foot\"]\n";
     place.write("pile.toml", PILE.replace("name = \"push\"\n", taken));
-    let outcome = place.run(&["run", "pile.toml", "--out", "out"]);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    let outcome = place.refused(&["run", "pile.toml", "--out", "out"]);
     let line = 1
         + PILE
             .lines()
             .position(|line| line == "name = \"push\"")
             .unwrap()
         + 1;
-    for said in [
-        "interface `lower` is active and the ground on one of its sides, group `foot`, is not",
-        &format!("pile.toml:{line}:"),
-        "`deactivate` has `lower` too",
-    ] {
-        assert!(outcome.says(said), "{said}: {}", outcome.stderr);
-    }
+    outcome
+        .shows(
+            "interface `lower` is active and the ground on one of its sides, group `foot`, is not",
+        )
+        .shows(&format!("pile.toml:{line}:"))
+        .shows("`deactivate` has `lower` too");
 }
 
 /// A tube holds more outside than inside: its mean friction is that by their girths.
@@ -537,7 +509,7 @@ fn the_curve_of_a_test_begins_where_the_phase_before_it_ended() {
         let (place, _) = run(&text);
         let history = rows(&place.path("out/history.csv"));
         let before = history.iter().rfind(|row| row["phase"] == "built").unwrap();
-        let start = &summary(&place)["pile"]["start"];
+        let start = &place.summary()["pile"]["start"];
         let settled = if resets {
             0.0
         } else {
@@ -580,12 +552,9 @@ fn a_dry_run_asks_the_laws_for_their_strength() {
             assert_eq!(place.run(&arguments).stderr, outcome.stderr);
             // The run has found it before it wrote anything.
             assert_eq!(place.contents(), ["pile.toml"]);
-            assert!(
-                outcome.says("outside the strength of law"),
-                "{}",
-                outcome.stderr
-            );
-            assert!(outcome.says("pile.toml:"), "{}", outcome.stderr);
+            outcome
+                .shows("outside the strength of law")
+                .shows("pile.toml:");
         }
     }
 }

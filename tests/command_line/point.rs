@@ -1,7 +1,7 @@
 //! `pilum point`: a driver file with variants, all of them or one.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
-use crate::program::{BAD_INPUT, DONE, Outcome, Place};
+use crate::program::{DONE, Outcome, Place};
 use tests::case::table;
 
 const DRIVER: &str = r#"law = "coulomb_joint"
@@ -43,8 +43,7 @@ fn shear(place: &Place, file: &str) -> f64 {
 #[test]
 fn runs_all_variants_with_a_table_each() {
     let place = Place::new();
-    let outcome = point(&place, &["--csv", "out.csv"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = point(&place, &["--csv", "out.csv"]).ended(DONE);
     assert_eq!(outcome.stdout, "");
     assert!((shear(&place, "out_rough.csv") - 100.0).abs() < 1e-9);
     assert!(shear(&place, "out_smooth.csv").abs() < 1e-9);
@@ -58,18 +57,15 @@ fn runs_all_variants_with_a_table_each() {
 #[test]
 fn runs_one_variant() {
     let place = Place::new();
-    let outcome = point(&place, &["--variant", "smooth", "--csv", "out.csv"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = point(&place, &["--variant", "smooth", "--csv", "out.csv"]).ended(DONE);
     assert_eq!(place.contents(), ["driver.toml", "out.csv"]);
     assert!(shear(&place, "out.csv").abs() < 1e-9);
-    assert!(outcome.says("variant smooth"), "{}", outcome.stderr);
-    assert!(!outcome.says("variant rough"), "{}", outcome.stderr);
+    outcome.shows("variant smooth").hides("variant rough");
 }
 
 #[test]
 fn one_variant_alone_goes_to_standard_output() {
-    let outcome = point(&Place::new(), &["--variant", "rough"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = point(&Place::new(), &["--variant", "rough"]).ended(DONE);
     assert!(outcome.stdout.starts_with("increment,jump_n,jump_t,"));
     assert_eq!(outcome.stdout.lines().count(), 6);
 }
@@ -86,15 +82,9 @@ fn refuses_a_variant_that_there_is_not() {
             ),
         };
         place.write("file.toml", driver);
-        let outcome = place.run(&[command, "file.toml", "--variant", "smoth"]);
-        assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-        assert!(
-            outcome.says(
-                "there is no variant `smoth`: did you mean `smooth`? There is: rough, smooth"
-            ),
-            "{}",
-            outcome.stderr
-        );
+        let outcome = place.refused(&[command, "file.toml", "--variant", "smoth"]);
+        outcome
+            .shows("there is no variant `smoth`: did you mean `smooth`? There is: rough, smooth");
         assert_eq!(place.contents(), ["file.toml"]);
     }
 }

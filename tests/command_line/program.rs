@@ -1,9 +1,11 @@
 //! Running the program in its own folder, and tables of mistakes in a small case.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 use tempfile::TempDir;
+pub(crate) use tests::outcome::Outcome;
+use tests::place::{built_program, deps};
 
 /// Exit codes, `input::Error::exit_code`.
 pub(crate) const DONE: i32 = 0;
@@ -110,25 +112,6 @@ pub(crate) fn edited(edits: &[Edit]) -> String {
     })
 }
 
-/// What became of a run of the program.
-#[derive(Debug)]
-pub(crate) struct Outcome {
-    pub(crate) code: Option<i32>,
-    pub(crate) stdout: String,
-    pub(crate) stderr: String,
-}
-
-impl Outcome {
-    /// Whether the message contains a text, however its lines are broken.
-    pub(crate) fn says(&self, text: &str) -> bool {
-        squeezed(&self.stderr).contains(&squeezed(text))
-    }
-}
-
-fn squeezed(text: &str) -> String {
-    text.split_whitespace().collect()
-}
-
 /// A folder to run the program in.
 #[derive(Debug)]
 pub(crate) struct Place {
@@ -154,16 +137,11 @@ impl Place {
 
     /// The program with this folder as its working directory.
     pub(crate) fn command(&self, arguments: &[&str]) -> Command {
-        let deps = std::env::current_exe()
-            .unwrap()
-            .parent()
-            .unwrap()
-            .to_owned();
-        let mut command = Command::new(program(&deps));
+        let mut command = Command::new(built_program());
         command
             .args(arguments)
             .current_dir(self.folder.path())
-            .env("PILUM_LAW_PATH", deps)
+            .env("PILUM_LAW_PATH", deps())
             .env("XDG_CACHE_HOME", env!("CARGO_TARGET_TMPDIR"))
             .env("NO_COLOR", "1")
             .env_remove("RUST_BACKTRACE");
@@ -185,12 +163,7 @@ impl Place {
     /// Runs the program with variables of its environment.
     pub(crate) fn run_with(&self, arguments: &[&str], variables: &[(&str, &str)]) -> Outcome {
         let mut command = self.command(arguments);
-        let output = command.envs(variables.iter().copied()).output().unwrap();
-        Outcome {
-            code: output.status.code(),
-            stdout: String::from_utf8(output.stdout).unwrap(),
-            stderr: String::from_utf8(output.stderr).unwrap(),
-        }
+        Outcome::of(command.envs(variables.iter().copied()))
     }
 
     /// Runs the program from a shell that has set limits to itself.
@@ -207,18 +180,55 @@ impl Place {
                 None => command.env_remove(name),
             };
         }
-        let output = command.output().unwrap();
-        Outcome {
-            code: output.status.code(),
-            stdout: String::from_utf8(output.stdout).unwrap(),
-            stderr: String::from_utf8(output.stderr).unwrap(),
-        }
+        Outcome::of(&mut command)
     }
 
     /// Runs a case given as the bytes of its file; results go to `out`.
     pub(crate) fn run_case(&self, text: impl AsRef<[u8]>) -> Outcome {
         self.write("case.toml", text);
         self.run(&["run", "case.toml", "--out", "out"])
+    }
+
+    /// Runs a command that must succeed.
+    #[track_caller]
+    pub(crate) fn done(&self, arguments: &[&str]) -> Outcome {
+        self.run(arguments).ended(DONE)
+    }
+
+    /// Runs a command with input that must be refused.
+    #[track_caller]
+    pub(crate) fn refused(&self, arguments: &[&str]) -> Outcome {
+        self.run(arguments).ended(BAD_INPUT)
+    }
+
+    /// Runs a case that must succeed.
+    #[track_caller]
+    pub(crate) fn done_case(&self, text: impl AsRef<[u8]>) -> Outcome {
+        self.run_case(text).ended(DONE)
+    }
+
+    /// Runs a case that must be refused.
+    #[track_caller]
+    pub(crate) fn refused_case(&self, text: impl AsRef<[u8]>) -> Outcome {
+        self.run_case(text).ended(BAD_INPUT)
+    }
+
+    /// The text of a file.
+    #[track_caller]
+    pub(crate) fn read(&self, name: &str) -> String {
+        std::fs::read_to_string(self.path(name)).unwrap()
+    }
+
+    /// The values of a JSON file.
+    #[track_caller]
+    pub(crate) fn json(&self, name: &str) -> serde_json::Value {
+        serde_json::from_str(&self.read(name)).unwrap()
+    }
+
+    /// `summary.json` of the results in `out`.
+    #[track_caller]
+    pub(crate) fn summary(&self) -> serde_json::Value {
+        self.json("out/summary.json")
     }
 
     /// Names of what lies in the folder, sorted.
@@ -231,46 +241,76 @@ impl Place {
     }
 }
 
-/// The program next to the folder of the test executables.
-fn program(deps: &Path) -> PathBuf {
-    let name = format!("pilum{}", std::env::consts::EXE_SUFFIX);
-    let path = deps.parent().unwrap().join(name);
-    assert!(
-        path.is_file(),
-        "{} is missing: `cargo test --workspace` builds it, or `cargo build -p pilum` (with the \
-         same profile)",
-        path.display()
-    );
-    path
+/// A mistake: what it is, the edits that make it, what the message says.
+type Mistake<'a> = (&'a str, Vec<(String, String)>, Vec<String>);
+
+/// Mistakes in rows: what it is; below it, indented, edits as `from => to`, then what the message says. An edit may
+/// also stand for what it is. `\n` is the end of a line. A `^` in an edit marks the place that the message has to
+/// name, and is not part of the file.
+fn mistakes(table: &str) -> Vec<Mistake<'_>> {
+    let mut mistakes: Vec<Mistake<'_>> = Vec::new();
+    for line in table.lines().filter(|line| !line.is_empty()) {
+        let is_new = !line.starts_with("  ");
+        if is_new {
+            mistakes.push((line, Vec::new(), Vec::new()));
+        }
+        let (_, edits, says) = mistakes.last_mut().unwrap();
+        let text = |text: &str| text.trim().replace("\\n", "\n");
+        match line.split_once(" =>") {
+            Some((from, to)) => edits.push((text(from), text(to))),
+            None if !is_new => says.push(text(line)),
+            None => (),
+        }
+    }
+    mistakes
 }
 
-/// A mistake: what it is, the edits that make it, what the message says. A `^` in an edit marks
-/// the place that the message has to name, and is not part of the file.
-pub(crate) type Mistake = (&'static str, &'static [Edit], &'static [&'static str]);
+/// Makes each mistake in the case. All must be refused with a message at the place that says what it has to,
+/// without leaving anything behind.
+pub(crate) fn refuses(mistakes: &str) {
+    refuses_in(CASE, BAD_INPUT, mistakes);
+}
 
-/// Makes each mistake. All must end with this code and a message at the place that says what it
-/// has to, without leaving anything behind.
-pub(crate) fn refuses(code: i32, mistakes: &[Mistake]) {
+/// The same in this case, with this exit code.
+pub(crate) fn refuses_in(case: &str, code: i32, mistakes: &str) {
+    let run = ["run", "case.toml", "--out", "out"];
+    refuses_file(&Place::new(), ("case.toml", case), &run, code, mistakes);
+}
+
+/// The same in this file, which these arguments run.
+pub(crate) fn refuses_file(
+    place: &Place,
+    (file, contents): (&str, &str),
+    run: &[&str],
+    code: i32,
+    table: &str,
+) {
     let mut complaints = Vec::new();
-    for (what, edits, says) in mistakes {
-        let place = Place::new();
-        let text = edited(edits);
-        let outcome = place.run_case(text.replacen('^', "", 1));
+    for (what, edits, says) in mistakes(table) {
+        let text = edits.iter().fold(contents.to_owned(), |text, (from, to)| {
+            assert!(text.contains(from), "{file} does not contain {from:?}");
+            text.replacen(from, to, 1)
+        });
+        let is_told = !says.is_empty() || text.contains('^');
+        assert!(is_told && !edits.is_empty(), "{what}");
+        place.write(file, text.replacen('^', "", 1));
+        let before = place.contents();
+        let outcome = place.run(run);
         let mut wrong = Vec::new();
         if outcome.code != Some(code) {
             wrong.push(format!("exit code {:?}, expected {code}", outcome.code));
         }
         if let Some(at) = text.find('^').map(|at| position(&text, at))
-            && !outcome.says(&format!("case.toml:{at}"))
+            && !outcome.says(&format!("{file}:{at}"))
         {
-            wrong.push(format!("the place is not case.toml:{at}"));
+            wrong.push(format!("the place is not {file}:{at}"));
         }
         let missing = says.iter().filter(|text| !outcome.says(text));
         wrong.extend(missing.map(|text| format!("it does not say: {text}")));
         if !outcome.stdout.is_empty() {
             wrong.push("something on standard output".to_owned());
         }
-        if place.contents() != ["case.toml"] {
+        if place.contents() != before {
             wrong.push(format!("left behind: {:?}", place.contents()));
         }
         if !wrong.is_empty() {
@@ -291,6 +331,5 @@ fn position(text: &str, at: usize) -> String {
 
 #[test]
 fn the_case_itself_runs() {
-    let outcome = Place::new().run_case(CASE);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    Place::new().done_case(CASE);
 }

@@ -33,8 +33,7 @@ pub(crate) fn sliding() -> String {
 #[test]
 fn prints_plain_lines_of_progress_and_one_line_of_result() {
     let place = Place::new();
-    let outcome = place.run_case(CASE);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = place.done_case(CASE);
     assert_eq!(
         outcome.stdout,
         "results in out\nreport in out/report.html\n"
@@ -62,11 +61,10 @@ fn prints_plain_lines_of_progress_and_one_line_of_result() {
 #[test]
 fn warns_of_unusual_parameters_and_goes_on() {
     let place = Place::new();
-    let outcome = place.run_case(CASE.replace("1e4", "2e9"));
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = place.done_case(CASE.replace("1e4", "2e9"));
     let warning = "law `elastic`: young_modulus = 2000000000 kPa is outside its usual range";
     let said = format!("warning: {warning}");
-    assert!(outcome.says(&said), "{}", outcome.stderr);
+    outcome.shows(&said);
     assert!(outcome.stdout.starts_with("results in out\n"));
     assert_warns(&place, warning);
 }
@@ -75,54 +73,46 @@ fn warns_of_unusual_parameters_and_goes_on() {
 fn warns_of_a_phase_that_starts_out_of_balance() {
     // What held the middle is given up.
     let place = Place::new();
-    let outcome = place.run_case(edited(&[(
+    let outcome = place.done_case(edited(&[(
         "[[phase]]\nname = \"push\"",
         "[[phase]]\nname = \"hold\"\nincrements = 1\n\
          displacement = [{ line = \"middle\", x = 1e-6 }]\n\n\
          [[phase]]\nname = \"push\"\nfree = [{ line = \"middle\", components = [\"x\"] }]",
     )]));
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
     let warning = "phase `push` starts out of balance by ";
-    assert!(outcome.says(warning), "{}", outcome.stderr);
+    outcome.shows(warning);
     assert_warns(&place, warning);
 }
 
 #[test]
 fn a_run_without_anything_unusual_has_no_warnings() {
     let place = Place::new();
-    assert_eq!(place.run_case(CASE).code, Some(DONE));
-    assert_eq!(summary(&place)["warnings"], serde_json::json!([]));
+    place.done_case(CASE);
+    assert_eq!(place.summary()["warnings"], serde_json::json!([]));
 }
 
 /// One of the summary's warnings starts like this, and the report shows it.
 fn assert_warns(place: &Place, start: &str) {
-    let summary = summary(place);
+    let summary = place.summary();
     let warnings = summary["warnings"].as_array().unwrap();
     let mut warnings = warnings.iter().filter_map(|warning| warning.as_str());
     assert!(warnings.any(|warning| warning.starts_with(start)));
-    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    let report = place.read("out/report.html");
     assert!(report.contains(&format!("<li>{start}")));
-}
-
-fn summary(place: &Place) -> serde_json::Value {
-    let text = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
-    serde_json::from_str(&text).unwrap()
 }
 
 #[test]
 fn keeps_what_was_reached_when_there_is_no_equilibrium() {
     let place = Place::new();
-    let outcome = place.run_case(sliding());
-    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
+    let outcome = place.run_case(sliding()).ended(NO_EQUILIBRIUM);
     assert_eq!(outcome.stdout, "report in out/report.html\n");
-    assert!(outcome.says("phase `push`"), "{}", outcome.stderr);
-    assert!(outcome.says("no equilibrium"), "{}", outcome.stderr);
+    outcome.shows("phase `push`").shows("no equilibrium");
     // 40 of 100 kPa are 8 of 20 increments; the last one of them is the limit itself.
     let rows = table(&place.path("out/history.csv"));
     let pushed = rows.iter().filter(|row| row["phase"] == "push").count();
     assert!((7..=8).contains(&pushed), "{pushed} increments");
-    assert_eq!(summary(&place)["status"], "no equilibrium");
-    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    assert_eq!(place.summary()["status"], "no equilibrium");
+    let report = place.read("out/report.html");
     assert!(report.contains("<span class=\"status failed\">no equilibrium</span>"));
 }
 
@@ -167,13 +157,12 @@ fn the_report_of_a_run_is_that_of_its_files() {
     ];
     for (text, code, shown) in cases {
         let place = Place::new();
-        let outcome = place.run_case(text);
-        assert_eq!(outcome.code, Some(code), "{}", outcome.stderr);
-        let read = || std::fs::read_to_string(place.path("out/report.html")).unwrap();
+        place.run_case(text).ended(code);
+        let read = || place.read("out/report.html");
         let of_run = read();
         assert!(of_run.contains(shown), "{shown}");
         assert!(of_run.contains("traction_n"), "no profiles");
-        assert_eq!(place.run(&["report", "out"]).code, Some(DONE));
+        place.done(&["report", "out"]);
         assert!(of_run == read(), "another page is made of the files");
     }
 }
@@ -182,16 +171,12 @@ fn the_report_of_a_run_is_that_of_its_files() {
 #[test]
 fn a_study_that_fails_leaves_no_results_of_an_earlier_run() {
     let place = Place::new();
-    let outcome = place.run_case(sliding());
-    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
+    place.run_case(sliding()).ended(NO_EQUILIBRIUM);
     assert!(place.path("out/summary.json").is_file());
-    let outcome = place.run_case(sliding().replacen("title", "accuracy = 0.1\ntitle", 1));
-    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
-    assert!(
-        outcome.says("the last trial of `accuracy`"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = place
+        .run_case(sliding().replacen("title", "accuracy = 0.1\ntitle", 1))
+        .ended(NO_EQUILIBRIUM);
+    outcome.shows("the last trial of `accuracy`");
     for gone in [
         "summary.json",
         "history.csv",
@@ -225,34 +210,31 @@ fn names_the_check_of_a_law_that_may_have_a_wrong_tangent() {
             assert!(text.contains(from), "{from}");
             text.replacen(from, to, 1)
         });
-    let outcome = place.run_case(case);
-    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
+    let outcome = place.run_case(case).ended(NO_EQUILIBRIUM);
     let check = format!("`pilum check {}` {CLAUSE}", troubled::library());
-    assert!(outcome.says(&check), "{}", outcome.stderr);
+    outcome.shows(&check);
     // Not what contact does, but what the law says of its own stress.
     let entry = "differs from differences of its own stress by";
-    assert!(outcome.says(entry), "{}", outcome.stderr);
-    assert!(outcome.says("in (t, t)"), "{}", outcome.stderr);
-    assert!(!outcome.says("opens and closes"), "{}", outcome.stderr);
+    outcome
+        .shows(entry)
+        .shows("in (t, t)")
+        .hides("opens and closes");
     // With the tangent that is right, the law fails of itself.
     let place = troubled::place("").unwrap();
-    let outcome = place.run_case(troubled::case("cut"));
-    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
-    assert!(!outcome.says(CLAUSE), "{}", outcome.stderr);
-    let outcome = Place::new().run_case(sliding());
-    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
-    assert!(!outcome.says(CLAUSE), "{}", outcome.stderr);
+    let outcome = place.run_case(troubled::case("cut")).ended(NO_EQUILIBRIUM);
+    outcome.hides(CLAUSE);
+    let outcome = Place::new().run_case(sliding()).ended(NO_EQUILIBRIUM);
+    outcome.hides(CLAUSE);
 }
 
 #[test]
 fn leaves_earlier_results_alone_when_the_input_is_bad() {
     let place = Place::new();
-    assert_eq!(place.run_case(CASE).code, Some(DONE));
+    place.done_case(CASE);
     let files = ["history.csv", "summary.json", "report.html"];
     let read = || files.map(|file| std::fs::read(place.path("out").join(file)).unwrap());
     let before = read();
-    let outcome = place.run_case(CASE.replace("\"traction_t\"", "\"traction_s\""));
-    assert_eq!(outcome.code, Some(BAD_INPUT));
+    let outcome = place.refused_case(CASE.replace("\"traction_t\"", "\"traction_s\""));
     assert_eq!(outcome.stdout, "");
     assert!(read() == before);
 }
@@ -267,8 +249,7 @@ fn does_not_write_into_a_pipe() {
         .arg(place.path("out/history.csv"))
         .status();
     assert!(made.unwrap().success());
-    let outcome = place.run_case(CASE);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    let outcome = place.refused_case(CASE);
     assert!(outcome.stderr.contains("history.csv"), "{}", outcome.stderr);
 }
 
@@ -304,10 +285,9 @@ fn writes_through_no_link() {
         }
     }
     std::os::unix::fs::symlink(place.path("nowhere"), place.path("out/fields_00001.vtu")).unwrap();
-    let outcome = place.run_case(with_everything());
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done_case(with_everything());
     for number in 0..files.len() {
-        let mine = std::fs::read_to_string(place.path(&format!("mine_{number}"))).unwrap();
+        let mine = place.read(&format!("mine_{number}"));
         assert_eq!(mine, "mine", "{}", files[number]);
     }
     assert!(!place.path("nowhere").exists());
@@ -330,12 +310,10 @@ fn a_table_is_not_written_over_its_driver_by_another_name() {
                   segment = [{ increments = 2, control = { 11 = { strain = 1e-3 } } }]\n";
     place.write("driver.toml", driver);
     std::fs::hard_link(place.path("driver.toml"), place.path("table.csv")).unwrap();
-    let outcome = place.run(&["point", "driver.toml", "--csv", "table.csv"]);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    assert!(outcome.says("would overwrite the driver file"));
+    let outcome = place.refused(&["point", "driver.toml", "--csv", "table.csv"]);
+    outcome.shows("would overwrite the driver file");
     std::os::unix::fs::symlink(place.path("there"), place.path("link.csv")).unwrap();
-    let outcome = place.run(&["point", "driver.toml", "--csv", "link.csv"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&["point", "driver.toml", "--csv", "link.csv"]);
     assert!(place.path("there").is_file());
 }
 
@@ -349,7 +327,7 @@ fn with_everything() -> String {
 #[test]
 fn removes_what_an_earlier_run_left_and_nothing_else() {
     let place = Place::new();
-    assert_eq!(place.run_case(with_everything()).code, Some(DONE));
+    place.done_case(with_everything());
     let left = [
         "curve.svg",
         "fields.pvd",
@@ -376,7 +354,7 @@ fn removes_what_an_earlier_run_left_and_nothing_else() {
     }
     // The next run writes none of them but the report, after which nobody asks here.
     let quiet = sliding().replace("profile = \"phases\"", "profile = \"never\"");
-    assert_eq!(place.run_case(quiet).code, Some(NO_EQUILIBRIUM));
+    place.run_case(quiet).ended(NO_EQUILIBRIUM);
     for file in left.iter().filter(|file| **file != "report.html") {
         assert!(!is_there(file), "{file} is still there");
     }
@@ -384,7 +362,7 @@ fn removes_what_an_earlier_run_left_and_nothing_else() {
         let text = std::fs::read_to_string(place.path("out").join(file)).unwrap();
         assert_eq!(text, "mine", "{file}");
     }
-    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    let report = place.read("out/report.html");
     assert!(report.contains("no equilibrium") && !report.contains("id=\"contours\""));
 }
 
@@ -409,15 +387,14 @@ fn a_run_that_was_interrupted_says_running() {
     }
     child.kill().unwrap();
     child.wait().unwrap();
-    assert_eq!(summary(&place)["status"], "running");
+    assert_eq!(place.summary()["status"], "running");
     assert!(!place.path("out/summary.json.part").exists());
-    let outcome = place.run(&["report", "out"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    place.done(&["report", "out"]);
+    let report = place.read("out/report.html");
     assert!(report.contains("stopped from outside or has not ended yet"));
     // A run that ends says so, and nothing of the interrupted one is left.
-    assert_eq!(place.run_case(CASE).code, Some(DONE));
-    assert_eq!(summary(&place)["status"], "done");
+    place.done_case(CASE);
+    assert_eq!(place.summary()["status"], "done");
 }
 
 #[test]
@@ -425,13 +402,8 @@ fn a_report_that_cannot_be_written_does_not_hide_the_run() {
     for (case, code) in [(CASE.to_owned(), BAD_INPUT), (sliding(), NO_EQUILIBRIUM)] {
         let place = Place::new();
         place.write("out/report.html/report.html/in_the_way", "");
-        let outcome = place.run_case(&case);
-        assert_eq!(outcome.code, Some(code), "{}", outcome.stderr);
-        assert!(
-            outcome.says("cannot write out/report.html"),
-            "{}",
-            outcome.stderr
-        );
+        let outcome = place.run_case(&case).ended(code);
+        outcome.shows("cannot write out/report.html");
         let failed = code == NO_EQUILIBRIUM;
         assert_eq!(outcome.says("no equilibrium beyond"), failed);
         assert_eq!(outcome.stdout.contains("results in out"), !failed);
@@ -464,8 +436,7 @@ fn compares_all_variants_that_have_results() {
     // Left by an earlier run of all variants, and by somebody else.
     place.write("out/curve.svg", "old");
     place.write("out/drawing.svg", "mine");
-    let outcome = place.run_case(variants());
-    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
+    let outcome = place.run_case(variants()).ended(NO_EQUILIBRIUM);
     assert_eq!(
         outcome.stdout,
         "results in out/rough\n\
@@ -476,14 +447,10 @@ fn compares_all_variants_that_have_results() {
          report in out/report.html\n"
     );
     // The error comes last, after the variants that went on.
-    assert!(
-        outcome.says("this is variant `overloaded`"),
-        "{}",
-        outcome.stderr
-    );
-    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    outcome.shows("this is variant `overloaded`");
+    let report = place.read("out/report.html");
     assert!(report.contains("<title>Comparison: rough, overloaded, rougher</title>"));
-    let read = |file: &str| std::fs::read_to_string(place.path(file)).unwrap();
+    let read = |file: &str| place.read(file);
     assert!(read("out/curve.svg").starts_with("<svg"));
     assert_eq!(read("out/drawing.svg"), "mine");
 }
@@ -493,13 +460,12 @@ fn one_variant_alone_is_not_compared() {
     let place = Place::new();
     place.write("case.toml", variants());
     let arguments = ["run", "case.toml", "--variant", "rough", "--out", "out"];
-    let outcome = place.run(&arguments);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = place.done(&arguments);
     assert_eq!(
         outcome.stdout,
         "results in out\nreport in out/report.html\n"
     );
-    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    let report = place.read("out/report.html");
     assert!(!report.contains("<title>Comparison"));
 }
 
@@ -515,7 +481,7 @@ fn results_do_not_depend_on_the_number_of_threads() {
     let place = Place::new();
     place.write("case.toml", &text);
     let results = ["1", "2", "3"].map(|threads| {
-        let outcome = place.run(&[
+        place.done(&[
             "run",
             "case.toml",
             "--variant",
@@ -525,15 +491,13 @@ fn results_do_not_depend_on_the_number_of_threads() {
             "--out",
             threads,
         ]);
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
         ["history.csv", "points.csv"]
             .map(|name| std::fs::read(place.path(threads).join(name)).unwrap())
     });
     assert!(results[0][1].len() > 1_000_000);
     assert!(results.iter().all(|files| *files == results[0]));
-    let outcome = place.run(&["run", "case.toml", "--threads", "0"]);
-    assert_eq!(outcome.code, Some(BAD_INPUT));
-    assert!(outcome.says("--threads"), "{}", outcome.stderr);
+    let outcome = place.refused(&["run", "case.toml", "--threads", "0"]);
+    outcome.shows("--threads");
 }
 
 #[test]
@@ -541,8 +505,7 @@ fn the_error_of_the_mesh_is_said_and_shown_where_it_is_asked_for() {
     let place = Place::new();
     let more = "profile = \"phases\"\nfields = \"phases\"\nmesh_error = true";
     let text = edited(&[("profile = \"phases\"", more)]);
-    let outcome = place.run_case(text);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = place.done_case(text);
     // The layer has none: it is no solid. Soil and layer are linear here or not; the soil is.
     let said = "error of the mesh in the strains, estimated at the end of phase `push`: ";
     let line = outcome
@@ -552,7 +515,7 @@ fn the_error_of_the_mesh_is_said_and_shown_where_it_is_asked_for() {
         .unwrap();
     assert!(line.contains("(soil ") && !line.contains("layer"), "{line}");
     assert!(!line.contains("yield"), "{line}");
-    let read = |name: &str| std::fs::read_to_string(place.path(name)).unwrap();
+    let read = |name: &str| place.read(name);
     let report = read("out/report.html");
     let shown = report.matches("error of the mesh in the strains").count();
     assert!(shown >= 2, "a line for each phase: {shown}");
@@ -563,7 +526,5 @@ fn the_error_of_the_mesh_is_said_and_shown_where_it_is_asked_for() {
     assert!(read("out/fields_00001.vtu").contains("Name=\"mesh_error\""));
 
     let text = edited(&[("profile = \"phases\"", "mesh_error = \"yes\"")]);
-    let outcome = place.run_case(text);
-    assert_eq!(outcome.code, Some(BAD_INPUT));
-    assert!(outcome.says("mesh_error"), "{}", outcome.stderr);
+    place.refused_case(text).shows("mesh_error");
 }

@@ -106,8 +106,7 @@ fn killed_and_resumed(text: &str, rows: usize, kills: u32) {
     let undisturbed = Place::new();
     undisturbed.write("block.toml", text);
     let started = Instant::now();
-    let outcome = undisturbed.run(&["run", "block.toml", "--out", "out", "--checkpoint", "0"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    undisturbed.done(&["run", "block.toml", "--out", "out", "--checkpoint", "0"]);
     let mut length = started.elapsed().as_secs_f64();
     let expected = results(&undisturbed.path("out"));
 
@@ -155,8 +154,7 @@ fn killed_and_resumed(text: &str, rows: usize, kills: u32) {
         on_the_way * 4 > kills as usize,
         "only {on_the_way} kills hit the run on its way"
     );
-    let outcome = place.run(&run);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&run);
     assert_same(&place.path("out"), &expected, "killed and resumed");
 }
 
@@ -170,8 +168,7 @@ fn methods_that_keep_a_matrix_resume_to_the_same_bits() {
             .replace("x = 1e-3", "x = 2e-5");
         let undisturbed = Place::new();
         undisturbed.write("block.toml", &text);
-        let outcome = undisturbed.run(&["run", "block.toml", "--out", "out"]);
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        undisturbed.done(&["run", "block.toml", "--out", "out"]);
         stopped_and_resumed(&text, &results(&undisturbed.path("out")), method);
     }
 }
@@ -193,8 +190,7 @@ fn groups_that_wait_for_a_complete_state_resume_to_the_same_bits() {
         let text = format!("{text}\n[solver]\n{solver}\n");
         let undisturbed = Place::new();
         undisturbed.write("block.toml", &text);
-        let outcome = undisturbed.run(&["run", "block.toml", "--out", "out"]);
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        undisturbed.done(&["run", "block.toml", "--out", "out"]);
         let expected = results(&undisturbed.path("out"));
         assert_eq!(expected.contains_key("path.csv"), control == "arc_length");
         stopped_and_resumed(&text, &expected, &solver);
@@ -206,8 +202,7 @@ fn the_table_of_a_pile_goes_on_to_the_same_bits() {
     let text = crate::pile::PILE.replace("increments = 12", "increments = 600");
     let undisturbed = Place::new();
     undisturbed.write("block.toml", &text);
-    let outcome = undisturbed.run(&["run", "block.toml", "--out", "out"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    undisturbed.done(&["run", "block.toml", "--out", "out"]);
     let expected = results(&undisturbed.path("out"));
     assert!(expected.contains_key("pile.csv"));
     stopped_and_resumed(&text, &expected, "pile");
@@ -217,14 +212,11 @@ fn the_table_of_a_pile_goes_on_to_the_same_bits() {
 /// entry of the last matrix, which may be that of a run before.
 const FORCELESS: &str = r#"
 analysis = "plane_strain"
+supports = [{ line = "bottom", fixed = ["x", "y"] }]
 [mesh]
 columns = [{ n = 2, to = 1.0 }]
 rows = [{ n = 2, to = 1.0 }, { n = 1, to = 1.01 }, { n = 2, to = 2.0 }]
-[[mesh.region]]
-group = "soil"
-[[mesh.region]]
-group = "layer"
-y = [1.0, 1.01]
+region = [{ group = "soil" }, { group = "layer", y = [1.0, 1.01] }]
 [mesh.lines]
 bottom = { y = 0.0 }
 top = { y = 2.0 }
@@ -248,9 +240,6 @@ formulation = "thin_layer"
 in_plane = "none"
 integration = "mean"
 law = "joint"
-[[supports]]
-line = "bottom"
-fixed = ["x", "y"]
 [[phase]]
 name = "lift"
 increments = 1500
@@ -267,8 +256,7 @@ fn a_run_without_any_force_resumes_to_the_same_bits() {
         let text = format!("{FORCELESS}method = \"{method}\"\n");
         let undisturbed = Place::new();
         undisturbed.write("block.toml", &text);
-        let outcome = undisturbed.run(&["run", "block.toml", "--out", "out"]);
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        undisturbed.done(&["run", "block.toml", "--out", "out"]);
         stopped_and_resumed(&text, &results(&undisturbed.path("out")), method);
     }
 }
@@ -290,8 +278,7 @@ fn a_node_that_leads_a_rigid_line_goes_on_to_the_same_bits() {
     for text in [&text, &text.replace("equations = \"sparse\"\n", "")] {
         let undisturbed = Place::new();
         undisturbed.write("block.toml", text);
-        let outcome = undisturbed.run(&["run", "block.toml", "--out", "out"]);
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        undisturbed.done(&["run", "block.toml", "--out", "out"]);
         // Friction of all of the layer, which is pressed together by a tenth of a metre.
         let reaction = *column(&undisturbed.path("out/history.csv"), "q")
             .last()
@@ -325,7 +312,7 @@ fn stopped_and_resumed(text: &str, expected: &BTreeMap<String, Vec<u8>>, what: &
             code => assert_eq!(code, Some(130), "{what}"),
         }
         stops += 1;
-        let summary = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
+        let summary = place.read("out/summary.json");
         assert!(summary.contains("\"status\": \"interrupted\""), "{summary}");
         assert!(place.path("out/report.html").is_file());
     }
@@ -374,8 +361,7 @@ fn the_same_case_gives_the_same_files() {
         place.write("block.toml", &text);
     }
     elsewhere.write("below/here", "");
-    let outcome = first.run(&["run", "block.toml", "--out", "out"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    first.done(&["run", "block.toml", "--out", "out"]);
     let expected = results(&first.path("out"));
     // Both at the same time, one with one thread and one with two.
     let mut children = [(&again, "1"), (&elsewhere, "2")]
@@ -396,8 +382,8 @@ fn a_full_disk_leaves_whole_rows() {
         "trap '' XFSZ; ulimit -f 100",
         &["run", "block.toml", "--out", "out"],
     );
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    assert!(outcome.says("cannot write"), "{}", outcome.stderr);
+    let outcome = outcome.ended(BAD_INPUT);
+    outcome.shows("cannot write");
     for name in ["history.csv", "profile.csv", "points.csv", "log.jsonl"] {
         let text = std::fs::read_to_string(place.path("out").join(name)).unwrap();
         assert!(text.ends_with('\n'), "{name} ends with a row cut short");
@@ -417,26 +403,16 @@ fn a_checkpoint_of_another_case_or_a_damaged_one_is_refused() {
         "0",
         "--resume",
     ];
-    assert_eq!(place.run(&run).code, Some(DONE));
-    let outcome = place.run(&run);
-    assert_eq!(outcome.code, Some(DONE));
-    assert!(outcome.says("done already"), "{}", outcome.stderr);
+    place.done(&run);
+    place.done(&run).shows("done already");
     place.write("block.toml", CASE.replace("1e-5", "2e-5"));
-    let outcome = place.run(&run);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    assert!(
-        outcome.says("it belongs to another case"),
-        "{}",
-        outcome.stderr
-    );
+    place.refused(&run).shows("it belongs to another case");
     let path = place.path("out/checkpoint.bin");
     let mut bytes = std::fs::read(&path).unwrap();
     let last = bytes.len() - 1;
     bytes[last] ^= 1;
     std::fs::write(&path, bytes).unwrap();
-    let outcome = place.run(&run);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    assert!(outcome.says("the file is damaged"), "{}", outcome.stderr);
+    place.refused(&run).shows("the file is damaged");
 }
 
 #[test]
@@ -452,8 +428,7 @@ fn files_that_were_changed_since_the_checkpoint_are_named() {
         "0",
         "--resume",
     ];
-    let outcome = place.run(&run);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&run);
     for file in ["history.csv", "profile.csv", "points.csv", "log.jsonl"] {
         let path = place.path("out").join(file);
         let good = std::fs::read(&path).unwrap();
@@ -464,8 +439,7 @@ fn files_that_were_changed_since_the_checkpoint_are_named() {
             std::fs::write(&path, bytes).unwrap();
             let outcome = place.run(&run);
             assert_eq!(outcome.code, Some(BAD_INPUT), "{file}: {}", outcome.stderr);
-            assert!(outcome.says(file), "{file}: {}", outcome.stderr);
-            assert!(outcome.says("changed or removed"), "{}", outcome.stderr);
+            outcome.shows(file).shows("changed or removed");
         }
         std::fs::write(&path, good).unwrap();
     }
@@ -474,13 +448,9 @@ fn files_that_were_changed_since_the_checkpoint_are_named() {
     std::fs::write(&field, &good[1..]).unwrap();
     assert!(place.run(&run).says("fields_00003.vtu"));
     std::fs::remove_file(&field).unwrap();
-    let outcome = place.run(&run);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    assert!(outcome.says("fields_00003.vtu"), "{}", outcome.stderr);
+    place.refused(&run).shows("fields_00003.vtu");
     std::fs::write(&field, &good).unwrap();
-    let outcome = place.run(&run);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(outcome.says("done already"), "{}", outcome.stderr);
+    place.done(&run).shows("done already");
 }
 
 #[test]
@@ -490,11 +460,6 @@ fn two_runs_do_not_write_into_one_folder() {
     place.write("out/log.jsonl", "");
     let log = std::fs::File::open(place.path("out/log.jsonl")).unwrap();
     log.lock().unwrap();
-    let outcome = place.run(&["run", "block.toml", "--out", "out"]);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    assert!(
-        outcome.says("another run is writing into this folder"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = place.refused(&["run", "block.toml", "--out", "out"]);
+    outcome.shows("another run is writing into this folder");
 }

@@ -1,13 +1,13 @@
 //! `pilum table`: runs side by side as comma-separated values.
 
-use crate::program::{BAD_INPUT, CASE, DONE, Place};
+use crate::program::{BAD_INPUT, CASE, Place};
 
 fn two_runs() -> Place {
     let place = Place::new();
     let figure = "[[figure]]\nname = \"f\"\nx = \"tau\"\ny = [\"half\"]\n";
     place.write("case.toml", CASE.to_owned() + figure);
     for (name, cohesion, push) in [("a", "5", "1e-5"), ("b", "7.5", "2e-5")] {
-        let outcome = place.run(&[
+        place.done(&[
             "run",
             "case.toml",
             "--out",
@@ -17,7 +17,6 @@ fn two_runs() -> Place {
             "--set",
             &format!("phase.push.displacement.1.x={push}"),
         ]);
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
     }
     place
 }
@@ -25,8 +24,7 @@ fn two_runs() -> Place {
 #[test]
 fn a_row_for_each_run() {
     let place = two_runs();
-    let outcome = place.run(&["table", "runs"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = place.done(&["table", "runs"]);
     let rows: Vec<Vec<&str>> = outcome
         .stdout
         .lines()
@@ -63,9 +61,8 @@ fn a_row_for_each_run() {
         }
     }
     // One of them twice stands there once; a file takes the table.
-    let again = place.run(&["table", "runs/a", "runs", "--out", "table.csv"]);
-    assert_eq!(again.code, Some(DONE), "{}", again.stderr);
-    let written = std::fs::read_to_string(place.path("table.csv")).unwrap();
+    place.done(&["table", "runs/a", "runs", "--out", "table.csv"]);
+    let written = place.read("table.csv");
     assert_eq!(written, outcome.stdout);
     // Of one run nothing differs.
     let one = place.run(&["table", "runs/b"]);

@@ -49,8 +49,7 @@ fn settings_override_the_file_and_are_recorded() {
         "phase.push.displacement.1.x=2e-5",
         "output.profile=never",
     ];
-    let outcome = run(&place, &settings);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    run(&place, &settings).ended(DONE);
     let set = summary(&place, "out");
     assert_eq!(set["set"], Value::from(settings.to_vec()));
     assert_eq!(
@@ -68,16 +67,14 @@ fn settings_override_the_file_and_are_recorded() {
         .replace("x = 1e-5", "x = 2e-5")
         .replace("profile = \"phases\"", "profile = \"never\"");
     place.write("file.toml", file);
-    let outcome = place.run(&["run", "file.toml", "--out", "file"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&["run", "file.toml", "--out", "file"]);
     let history = |folder: &str| std::fs::read(place.path(folder).join("history.csv")).unwrap();
     assert_eq!(history("out"), history("file"));
     let written = summary(&place, "file");
     assert_eq!(written["set"], Value::Array(Vec::new()));
     assert_ne!(written["case_sha256"], set["case_sha256"]);
     // The hash is that of the file's text, whatever is set.
-    let outcome = run(&place, &[]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    run(&place, &[]).ended(DONE);
     assert_eq!(summary(&place, "out")["case_sha256"], set["case_sha256"]);
 }
 
@@ -158,7 +155,7 @@ fn settings_hold_for_every_variant_and_over_bases() {
                     [[variant]]\nname = \"a\"\nlaws.joint.parameters.cohesion = 1.0\n\
                     [[variant]]\nname = \"b\"\n";
     place.write("case.toml", variants);
-    let outcome = place.run(&[
+    place.done(&[
         "run",
         "case.toml",
         "--out",
@@ -168,7 +165,6 @@ fn settings_hold_for_every_variant_and_over_bases() {
         "--set",
         "solver.max_iterations=30",
     ]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
     for variant in ["out/a", "out/b"] {
         let summary = summary(&place, variant);
         let law = &summary["laws"]["joint (interface_2d)"];
@@ -180,8 +176,7 @@ fn settings_hold_for_every_variant_and_over_bases() {
 #[test]
 fn a_run_is_resumed_only_with_its_settings() {
     let place = Place::new();
-    let outcome = run(&place, &["phase.push.increments=3"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    run(&place, &["phase.push.increments=3"]).ended(DONE);
     let resumed = |setting: &str| {
         place.run(&[
             "run",
@@ -193,12 +188,10 @@ fn a_run_is_resumed_only_with_its_settings() {
             setting,
         ])
     };
-    let outcome = resumed("phase.push.increments=3");
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(outcome.says("done already"), "{}", outcome.stderr);
-    let outcome = resumed("phase.push.increments=4");
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    assert!(outcome.says("other settings"), "{}", outcome.stderr);
+    let outcome = resumed("phase.push.increments=3").ended(DONE);
+    outcome.shows("done already");
+    let outcome = resumed("phase.push.increments=4").ended(BAD_INPUT);
+    outcome.shows("other settings");
 }
 
 #[test]
@@ -210,9 +203,8 @@ fn drivers_and_studies_take_settings() {
                   [[segment]]\nincrements = 4\ncontrol = { t = { jump = 1e-3 } }\n";
     place.write("driver.toml", driver);
     let strength = |set: &[&str]| {
-        let outcome = place.run(&[&["point", "driver.toml", "--csv", "rows.csv"], set].concat());
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-        let rows = std::fs::read_to_string(place.path("rows.csv")).unwrap();
+        place.done(&[&["point", "driver.toml", "--csv", "rows.csv"], set].concat());
+        let rows = place.read("rows.csv");
         let (header, last) = (rows.lines().next().unwrap(), rows.lines().last().unwrap());
         let column = header
             .split(',')
@@ -223,16 +215,10 @@ fn drivers_and_studies_take_settings() {
     };
     assert!((strength(&[]) - 10.0).abs() < 1e-9);
     assert!((strength(&["--set", "parameters.cohesion=4"]) - 4.0).abs() < 1e-9);
-    let outcome = place.run(&["point", "driver.toml", "--set", "segment.2.increments=1"]);
-    assert_eq!(outcome.code, Some(BAD_INPUT));
-    assert!(outcome.says("--set:1:9"), "{}", outcome.stderr);
-    let outcome = place.run(&["trade-off", "driver.toml", "--set", "parameters.cohesoin=4"]);
-    assert_eq!(outcome.code, Some(BAD_INPUT));
-    assert!(
-        outcome.says("did you mean `cohesion`?"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = place.refused(&["point", "driver.toml", "--set", "segment.2.increments=1"]);
+    outcome.shows("--set:1:9");
+    let outcome = place.refused(&["trade-off", "driver.toml", "--set", "parameters.cohesoin=4"]);
+    outcome.shows("did you mean `cohesion`?");
 }
 
 #[test]
@@ -243,19 +229,14 @@ fn an_initial_stress_of_the_command_line_is_refused_there() {
                   0.002 }\ninitial = { traction = { n = -100.0, t = 0.0 } }\n\
                   segment = [{ increments = 1, control = { t = { jump = 1e-4 } } }]\n";
     place.write("driver.toml", driver);
-    let outcome = place.run(&["point", "driver.toml"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&["point", "driver.toml"]);
     let setting = "initial.traction.n=50";
-    let outcome = place.run(&["point", "driver.toml", "--set", setting]);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    for words in ["--set:1:1", setting] {
-        assert!(outcome.says(words), "{words}: {}", outcome.stderr);
-    }
+    let outcome = place.refused(&["point", "driver.toml", "--set", setting]);
+    outcome.shows("--set:1:1").shows(setting);
     // In the file it is shown there.
     place.write("driver.toml", driver.replace("n = -100.0", "n = 50.0"));
-    let outcome = place.run(&["point", "driver.toml"]);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    assert!(outcome.says("driver.toml:4:"), "{}", outcome.stderr);
+    let outcome = place.refused(&["point", "driver.toml"]);
+    outcome.shows("driver.toml:4:");
 }
 
 #[test]
@@ -265,11 +246,6 @@ fn a_number_of_increments_is_a_whole_number() {
                   poisson_ratio = 0.3 }\nsegment = [{ increments = 2.5, control = { 11 = { strain = 1e-4 } \
                   } }]\n";
     place.write("driver.toml", driver);
-    let outcome = place.run(&["point", "driver.toml"]);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    assert!(
-        outcome.says("expected a whole number"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = place.refused(&["point", "driver.toml"]);
+    outcome.shows("expected a whole number");
 }

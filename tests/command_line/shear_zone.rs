@@ -1,9 +1,10 @@
 //! Interface laws made from laws of solids, `adapter = "shear_zone"`.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
-use crate::program::{BAD_INPUT, DONE, Edit, JOINT, NO_EQUILIBRIUM, Place, edited};
+use crate::program::{DONE, Edit, JOINT, NO_EQUILIBRIUM, Place, edited};
 use crate::umat;
 use tests::case::column;
+use tests::tolerance::near;
 
 /// The joint of the case, 1 cm of the soil.
 const ZONE: &str = "adapter = \"shear_zone\"\nlaw = \"elastic\"\nthickness = 0.01\n\
@@ -23,18 +24,14 @@ fn joint(law: &str) -> String {
 fn ends(place: &Place, text: &str, arguments: &[&str]) -> Vec<f64> {
     place.write("case.toml", text);
     let run = ["run", "case.toml", "--out", "out"];
-    let outcome = place.run(&[&run, arguments].concat());
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&[&run, arguments].concat());
     let end = |name| *column(&place.path("out/history.csv"), name).last().unwrap();
     ["settlement", "tau"].map(end).to_vec()
 }
 
 fn assert_same(found: &[f64], expected: &[f64]) {
     for (found, expected) in found.iter().zip(expected) {
-        assert!(
-            (found - expected).abs() <= 1e-9 * expected.abs(),
-            "{found} instead of {expected}"
-        );
+        near(*found, *expected, 1e-9 * expected.abs());
     }
 }
 
@@ -80,11 +77,9 @@ fn a_umat_fills_a_zone() {
     let text = joint(table);
     assert_same(&ends(&place, &text, &[]), &expected);
     // The lock of the case holds the routine; the summary says what was filled.
-    let outcome = place.run(&["lock", "case.toml"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&["lock", "case.toml"]);
     assert_same(&ends(&place, &text, &[]), &expected);
-    let summary = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
-    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    let summary = place.summary();
     let zone = &summary["laws"]["joint (interface_2d)"]["shear_zone"];
     assert_eq!(zone["thickness"].as_f64(), Some(0.01));
     assert_eq!(zone["lateral_ratio"].as_f64(), Some(1.0));
@@ -106,9 +101,10 @@ fn a_failed_call_is_repeated_in_its_zone() {
         return;
     };
     place.write("driver.toml", SMALLER);
-    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
-    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
-    let text = std::fs::read_to_string(place.path("out.failure.toml")).unwrap();
+    place
+        .run(&["point", "driver.toml", "--csv", "out.csv"])
+        .ended(NO_EQUILIBRIUM);
+    let text = place.read("out.failure.toml");
     let capsule: toml::Table = toml::from_str(&text).unwrap();
     let zone = &capsule["law"]["shear_zone"];
     assert_eq!(zone["thickness"].as_float(), Some(0.02));
@@ -117,27 +113,20 @@ fn a_failed_call_is_repeated_in_its_zone() {
     assert_eq!(start["traction"]["n"].as_float(), Some(-100.0));
     assert_eq!(start["internal"]["zone_stress_11"].as_float(), Some(-50.0));
     assert_eq!(start["internal"]["zone_stress_33"].as_float(), Some(-50.0));
-    let outcome = place.run(&["replay", "out.failure.toml"]);
-    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
-    assert!(
-        outcome.stdout.contains("as recorded: `cut step`"),
-        "{}",
-        outcome.stdout
-    );
+    let outcome = place
+        .run(&["replay", "out.failure.toml"])
+        .ended(NO_EQUILIBRIUM);
+    outcome.prints("as recorded: `cut step`");
 
     // What no zone can be is refused where it stands.
     place.write(
         "flat.toml",
         text.replacen("thickness = 0.02", "thickness = 0.0", 1),
     );
-    let outcome = place.run(&["replay", "flat.toml"]);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    assert!(
-        outcome.says("`thickness`: 0 m is outside (0, ∞)"),
-        "{}",
-        outcome.stderr
-    );
-    assert!(outcome.says("flat.toml"), "{}", outcome.stderr);
+    let outcome = place.refused(&["replay", "flat.toml"]);
+    outcome
+        .shows("`thickness`: 0 m is outside (0, ∞)")
+        .shows("flat.toml");
 }
 
 #[test]
@@ -236,21 +225,11 @@ fn what_cannot_be_a_zone_or_take_one_is_refused() {
     let nested = joint(&format!(
         "adapter = \"shear_zone\"\nlaw = \"other\"\nthickness = 0.01\n[laws.other]\n{ZONE}"
     ));
-    let outcome = place.run_case(nested);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    assert!(
-        outcome.says("law `other` is a shear zone itself"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = place.refused_case(nested);
+    outcome.shows("law `other` is a shear zone itself");
     let solid = joint(ZONE).replacen("law = \"soil\"", "law = \"joint\"", 1);
-    let outcome = place.run_case(solid);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    assert!(
-        outcome.says("law `joint` is a shear zone, made for interface_2d"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = place.refused_case(solid);
+    outcome.shows("law `joint` is a shear zone, made for interface_2d");
     // A driver's table that nothing is made from.
     let unused = SMALLER.replacen(
         "adapter = \"shear_zone\"\nthickness = 0.02\nlateral_ratio = 0.5\n",
@@ -258,9 +237,8 @@ fn what_cannot_be_a_zone_or_take_one_is_refused() {
         1,
     );
     place.write("driver.toml", unused);
-    let outcome = place.run(&["point", "driver.toml"]);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    assert!(outcome.says("law `soil` is not used"), "{}", outcome.stderr);
+    let outcome = place.refused(&["point", "driver.toml"]);
+    outcome.shows("law `soil` is not used");
 }
 
 #[test]
@@ -277,8 +255,7 @@ fn thicknesses_that_are_seldom_meant_are_warned_of() {
         ("thickness = 5.0", [true, true]),
         ("thickness = 5e-5", [true, true]),
     ] {
-        let outcome = place.run_case(layer(thickness));
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        let outcome = place.done_case(layer(thickness));
         for (words, said) in about.iter().zip(said) {
             assert_eq!(outcome.says(words), said, "{thickness}: {}", outcome.stderr);
         }
@@ -288,13 +265,8 @@ fn thicknesses_that_are_seldom_meant_are_warned_of() {
                 thickness = 5.0\nparameters = { young_modulus = 1e4, poisson_ratio = 0.3 }\n\
                 segment = [{ increments = 1, control = { t = { jump = 1e-3 } } }]\n";
     place.write("driver.toml", zone);
-    let outcome = place.run(&["point", "driver.toml"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(
-        outcome.says("thickness = 5 m of its shear zone is outside its usual range [1e-4, 0.5]"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = place.done(&["point", "driver.toml"]);
+    outcome.shows("thickness = 5 m of its shear zone is outside its usual range [1e-4, 0.5]");
 }
 
 #[test]
@@ -305,17 +277,12 @@ fn what_a_case_gives_to_start_from_is_looked_at_without_stress_too() {
         "poisson_ratio = 0.3, cohesion = 5.0, friction_angle = 30.0, dilatancy_angle = 0.0 }\n\
          initial = { zone_stress_11 = -500.0 }",
     );
-    let outcome = place.run_case(joint(&zone));
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    for words in [
-        "law `joint` takes over group `layer`",
-        "where it found none",
-    ] {
-        assert!(outcome.says(words), "{words}: {}", outcome.stderr);
-    }
-    let outcome = place.run_case(joint(&zone.replace("-500.0", "0.0")));
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(!outcome.says("takes over"), "{}", outcome.stderr);
+    let outcome = place.done_case(joint(&zone));
+    outcome
+        .shows("law `joint` takes over group `layer`")
+        .shows("where it found none");
+    let outcome = place.done_case(joint(&zone.replace("-500.0", "0.0")));
+    outcome.hides("takes over");
 }
 
 /// At 2e24 kPa a rounding of the strain changes the stress more than its tolerance, which is
@@ -334,8 +301,7 @@ fn a_stress_that_round_off_keeps_from_its_goal_is_told() {
     };
     for (young, said) in [("20e3", false), ("2e24", true)] {
         place.write("driver.toml", driver(young));
-        let outcome = place.run(&["point", "driver.toml"]);
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        let outcome = place.done(&["point", "driver.toml"]);
         let words = "is so stiff that rounding the strain changes the stress by as much";
         assert_eq!(outcome.says(words), said, "{young}: {}", outcome.stderr);
     }
@@ -351,9 +317,8 @@ fn a_strength_that_is_reached_is_not_called_a_law_that_takes_no_notice() {
          diameter = 0.6, soil = \"fine\", base_resistance = 2e3, shear_stiffness = 0.0 }\n\
          segment = [{ increments = 10, control = { n = { jump = -0.5 } } }]\n",
     );
-    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = place.done(&["point", "driver.toml", "--csv", "out.csv"]);
     let last = *column(&place.path("out.csv"), "traction_n").last().unwrap();
     assert!((last + 2e3).abs() < 1e-9, "{last}");
-    assert!(!outcome.says("takes no notice"), "{}", outcome.stderr);
+    outcome.hides("takes no notice");
 }

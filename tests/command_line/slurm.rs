@@ -93,7 +93,7 @@ fn tasks_whose_time_is_over_are_sent_in_again_and_go_on() {
 
     let found = table(&place);
     for task in ["log.1", "log.2"] {
-        let log = std::fs::read_to_string(place.path(task)).unwrap();
+        let log = place.read(task);
         assert!(log.contains("stopped as asked"), "{log}");
     }
     drop(cluster);

@@ -22,7 +22,7 @@ fn start(place: &Place, arguments: &[&str]) -> Child {
 }
 
 fn said(place: &Place) -> String {
-    std::fs::read_to_string(place.path("said")).unwrap()
+    place.read("said")
 }
 
 /// Waits until the program has said this.
@@ -54,11 +54,6 @@ fn code(child: &mut Child, place: &Place) -> Option<i32> {
     }
 }
 
-fn summary(place: &Place) -> serde_json::Value {
-    let text = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
-    serde_json::from_str(&text).unwrap()
-}
-
 /// Every point takes 20 ms in the second phase, which is 1000 increments long.
 fn slow_case() -> String {
     let text = troubled::case("sleep");
@@ -80,7 +75,7 @@ fn ctrl_c_to_the_whole_group_stops_a_run() {
         send("INT", &format!("-{}", child.id()));
         assert_eq!(code(&mut child, &place), Some(STOPPED), "{}", said(&place));
         assert!(!said(&place).contains("crashed"), "{}", said(&place));
-        assert_eq!(summary(&place)["status"], "interrupted");
+        assert_eq!(place.summary()["status"], "interrupted");
     }
 }
 
@@ -96,7 +91,7 @@ fn stolen_signals_stop_a_run() {
         wait_for(&place, "phase push: increment 1/");
         send(signal, &format!("-{}", child.id()));
         assert_eq!(code(&mut child, &place), Some(STOPPED), "{}", said(&place));
-        assert_eq!(summary(&place)["status"], "interrupted");
+        assert_eq!(place.summary()["status"], "interrupted");
     }
 }
 
@@ -116,8 +111,8 @@ fn a_law_that_never_returns_is_stopped() {
         text.contains("law `troubled`") && text.contains("layer"),
         "{text}"
     );
-    assert_eq!(summary(&place)["status"], "interrupted");
-    let history = std::fs::read_to_string(place.path("out/history.csv")).unwrap();
+    assert_eq!(place.summary()["status"], "interrupted");
+    let history = place.read("out/history.csv");
     assert_eq!(history.lines().count(), 3, "{history}");
 
     place.write("driver.toml", troubled::driver("loop"));
@@ -159,7 +154,7 @@ fn a_hopeless_increment_is_stopped_within_it() {
     assert_eq!(code(&mut child, &place), Some(STOPPED), "{}", said(&place));
     let text = said(&place);
     assert!(text.contains("within the increment"), "{text}");
-    let summary = summary(&place);
+    let summary = place.summary();
     assert_eq!(summary["status"], "interrupted");
     assert_eq!(summary["stopped_at"]["phase"], "weight");
 }
@@ -233,13 +228,8 @@ fn a_stopped_study_has_its_rows_and_goes_on() {
         assert!(second.contains(row), "{row:?} in {second:?}");
     }
     let other = [&resumed[..], &["--set", "solver.max_iterations=21"]].concat();
-    let outcome = place.run(&other);
-    assert_eq!(outcome.code, Some(1), "{}", outcome.stderr);
-    assert!(
-        outcome.says("it belongs to another case"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = place.run(&other).ended(1);
+    outcome.shows("it belongs to another case");
 }
 
 /// The study for an accuracy has a row for every run, and does not repeat them.
@@ -258,8 +248,9 @@ fn a_stopped_search_for_an_accuracy_goes_on() {
     let rows = || tests::case::table(&place.path("out/accuracy.csv"));
     let first = rows();
     assert!(first.len() >= 2, "{first:?}");
-    let outcome = place.run(&["run", "pile.toml", "--out", "out", "--resume"]);
-    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+    place
+        .run(&["run", "pile.toml", "--out", "out", "--resume"])
+        .ended(0);
     let second = rows();
     assert!(second.len() > first.len(), "{second:?}");
     assert_eq!(second[..first.len()], first);

@@ -59,11 +59,11 @@ fn a_full_output_is_said_in_a_line() {
 #[test]
 fn a_full_error_stream_is_exit_1_with_complete_results() {
     let place = place();
-    let outcome = place.run_limited("exec 2> /dev/full", &["run", "case.toml", "--out", "out"]);
-    assert_eq!(outcome.code, Some(BAD_INPUT));
-    let expected = place.run(&["run", "case.toml", "--out", "expected"]);
-    assert_eq!(expected.code, Some(DONE), "{}", expected.stderr);
-    let read = |file: &str| std::fs::read_to_string(place.path(file)).unwrap();
+    place
+        .run_limited("exec 2> /dev/full", &["run", "case.toml", "--out", "out"])
+        .ended(BAD_INPUT);
+    place.done(&["run", "case.toml", "--out", "expected"]);
+    let read = |file: &str| place.read(file);
     assert_eq!(read("out/history.csv"), read("expected/history.csv"));
     assert!(read("out/summary.json").contains("\"status\": \"done\""));
     assert!(place.path("out/report.html").is_file());
@@ -90,7 +90,7 @@ fn devices_and_pipes_are_no_libraries() {
                 "{command}: {}",
                 outcome.stderr
             );
-            assert!(outcome.says("expected a file"), "{}", outcome.stderr);
+            outcome.shows("expected a file");
         }
     }
 }
@@ -105,7 +105,7 @@ fn devices_and_endless_files_are_no_input() {
             "{command}: {}",
             outcome.stderr
         );
-        assert!(outcome.says("it is a device"), "{}", outcome.stderr);
+        outcome.shows("it is a device");
         let long = "truncate -s 100G long.toml; ulimit -t 10";
         let outcome = place().run_limited(long, &[command, "long.toml"]);
         assert_eq!(
@@ -114,12 +114,11 @@ fn devices_and_endless_files_are_no_input() {
             "{command}: {}",
             outcome.stderr
         );
-        assert!(outcome.says("longer than 16 MB"), "{}", outcome.stderr);
+        outcome.shows("longer than 16 MB");
     }
     // Shells write `<(…)` as a pipe.
     let pipe = "mkfifo pipe; cat driver.toml > pipe & :";
-    let outcome = place().run_limited(pipe, &["point", "pipe"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place().run_limited(pipe, &["point", "pipe"]).ended(DONE);
 }
 
 /// Whatever the limit, a run out of memory reports how much it needs. Its summary has the status of a
@@ -130,8 +129,7 @@ fn memory_that_runs_out_is_said() {
     let case = concat!(env!("CARGO_MANIFEST_DIR"), "/../cases/bonded_pile");
     let arguments = ["run", case, "--variant", "m2k", "--out", "out"];
     let place = Place::new();
-    let outcome = place.run(&[&arguments[..], &["--dry-run"]].concat());
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&[&arguments[..], &["--dry-run"]].concat());
     // In KiB of address space: too little for threads, for files, for the equations. The program itself
     // and the C library take 27 to 38 MB, by how it is optimised; with less it cannot be loaded.
     let limits = [44_000, 48_000, 60_000, 90_000];
@@ -164,7 +162,7 @@ fn memory_that_runs_out_is_said() {
                 "{limit}: {said}"
             );
             assert!(summary.contains("not enough memory"), "{limit}: {said}");
-            let history = std::fs::read_to_string(place.path("out/history.csv")).unwrap();
+            let history = place.read("out/history.csv");
             assert!(history.ends_with('\n'), "{limit}");
         }
     }
@@ -177,8 +175,9 @@ fn a_new_library_is_tried_within_the_limit() {
     let case = concat!(env!("CARGO_MANIFEST_DIR"), "/../cases/chamber_mesh1");
     let place = Place::new();
     let limits = "export XDG_CACHE_HOME=$PWD; ulimit -v 2000000";
-    let outcome = place.run_limited(limits, &["run", case, "--dry-run", "--out", "out"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place
+        .run_limited(limits, &["run", case, "--dry-run", "--out", "out"])
+        .ended(DONE);
     assert!(place.path("pilum/probed").is_dir());
 }
 
@@ -188,7 +187,8 @@ fn a_new_library_is_tried_within_the_limit() {
 fn a_file_that_may_not_grow_is_said() {
     let place = place();
     place.write("case.toml", CASE);
-    let outcome = place.run_limited("ulimit -f 1", &["run", "case.toml", "--out", "out"]);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    assert!(outcome.says("File too large"), "{}", outcome.stderr);
+    let outcome = place
+        .run_limited("ulimit -f 1", &["run", "case.toml", "--out", "out"])
+        .ended(BAD_INPUT);
+    outcome.shows("File too large");
 }

@@ -42,8 +42,7 @@ fn place(study: &str) -> Place {
 
 /// The table of a study, as `pilum table` writes it.
 fn table(place: &Place) -> String {
-    let outcome = place.run(&["table", "out"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = place.done(&["table", "out"]);
     outcome.stdout
 }
 
@@ -60,21 +59,12 @@ fn study(place: &Place, more: &[&str]) -> Outcome {
     place.run(&[&["study", "study.toml", "--out", "out"], more].concat())
 }
 
-fn done(outcome: &Outcome) {
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-}
-
 #[test]
 fn a_grid_is_carried_out_and_a_second_call_has_nothing_to_do() {
     let place = place(STUDY);
-    let outcome = study(&place, &["--jobs", "2"]);
-    done(&outcome);
-    assert!(
-        outcome.stdout.contains("6 runs: 6 done\n"),
-        "{}",
-        outcome.stdout
-    );
-    let runs = std::fs::read_to_string(place.path("out/runs.csv")).unwrap();
+    let outcome = study(&place, &["--jobs", "2"]).ended(DONE);
+    outcome.prints("6 runs: 6 done\n");
+    let runs = place.read("out/runs.csv");
     let header = "index,folder,cohesion,push,tau_max,tau_at,first,state,reason\n";
     assert!(runs.starts_with(header), "{runs}");
     let cells = |name: &str| column(&runs, name);
@@ -106,7 +96,9 @@ fn a_grid_is_carried_out_and_a_second_call_has_nothing_to_do() {
         "--set",
         "laws.joint.parameters.cohesion=5.0",
     ];
-    done(&place.run(&[&alone[..], &["--set", "phase.push.displacement.1.x=2e-5"]].concat()));
+    place
+        .run(&[&alone[..], &["--set", "phase.push.displacement.1.x=2e-5"]].concat())
+        .ended(DONE);
     let history = |folder: &str| std::fs::read(place.path(folder).join("history.csv")).unwrap();
     assert_eq!(history("alone"), history("out/00004"));
     let table = table(&place);
@@ -124,13 +116,8 @@ fn a_grid_is_carried_out_and_a_second_call_has_nothing_to_do() {
     is("first", taus[2].min(taus[3]));
     is("tau", taus[3]);
     // A plan is a plan, with the options of the command that is to follow, too.
-    let planned = study(&place, &["--plan", "--jobs", "2", "--retry"]);
-    done(&planned);
-    assert!(
-        planned.stdout.contains("6 runs\ntable in"),
-        "{}",
-        planned.stdout
-    );
+    let planned = study(&place, &["--plan", "--jobs", "2", "--retry"]).ended(DONE);
+    planned.prints("6 runs\ntable in");
     assert_eq!(self::table(&place), table);
     // Nothing is done twice.
     let written = || {
@@ -140,20 +127,19 @@ fn a_grid_is_carried_out_and_a_second_call_has_nothing_to_do() {
             .unwrap()
     };
     let before = written();
-    let again = study(&place, &[]);
-    done(&again);
+    let again = study(&place, &[]).ended(DONE);
     assert!(
         again.stderr.contains("6 of them done already"),
         "{}",
         again.stderr
     );
     let one = study(&place, &["--run", "4"]);
-    assert!(one.stdout.contains("run 4: done already"), "{}", one.stdout);
+    one.prints("run 4: done already");
     assert_eq!(written(), before);
-    done(&study(&place, &["--run", "4", "--anew"]));
+    study(&place, &["--run", "4", "--anew"]).ended(DONE);
     assert_ne!(written(), before);
     assert_eq!(self::table(&place), table);
-    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    let report = place.read("out/report.html");
     assert!(report.contains("6 of 6 runs done") && !report.contains("id=\"running\""));
 }
 
@@ -162,10 +148,9 @@ fn a_longer_study_keeps_the_runs_that_are_done() {
     let list = "case = \"case.toml\"\nmethod = \"list\"\n\
                 [[parameter]]\nkey = \"laws.joint.parameters.cohesion\"\nvalues = [2.0, 5.0]\n";
     let place = place(list);
-    done(&study(&place, &[]));
+    study(&place, &[]).ended(DONE);
     place.write("study.toml", list.replace("5.0]", "5.0, 7.0]"));
-    let longer = study(&place, &[]);
-    done(&longer);
+    let longer = study(&place, &[]).ended(DONE);
     assert!(
         longer.stderr.contains("3 runs, 2 of them done already"),
         "{}",
@@ -174,15 +159,10 @@ fn a_longer_study_keeps_the_runs_that_are_done() {
     // Other values, or another case, are another study.
     place.write("study.toml", list.replace("2.0,", "3.0,"));
     for more in [&[][..], &["--plan"], &["--run", "1"]] {
-        let other = study(&place, more);
-        assert_eq!(other.code, Some(BAD_INPUT));
-        assert!(
-            other.says("out/00001: it holds a run of another case"),
-            "{}",
-            other.stderr
-        );
+        let other = study(&place, more).ended(BAD_INPUT);
+        other.shows("out/00001: it holds a run of another case");
     }
-    done(&study(&place, &["--anew"]));
+    study(&place, &["--anew"]).ended(DONE);
     assert_eq!(
         column(&table(&place), "laws.joint.parameters.cohesion"),
         ["3.0", "5.0"]
@@ -198,10 +178,10 @@ fn the_table_does_not_depend_on_who_carries_it_out() {
         )
         .replace("levels = 2\n", "");
     let alone = place(&sampled);
-    done(&study(&alone, &["--jobs", "1"]));
+    study(&alone, &["--jobs", "1"]).ended(DONE);
     let expected = table(&alone);
     let several = place(&sampled);
-    done(&study(&several, &["--jobs", "4", "--threads", "2"]));
+    study(&several, &["--jobs", "4", "--threads", "2"]).ended(DONE);
     assert_eq!(table(&several), expected);
     // Processes that know nothing of each other, and no plan.
     let scattered = place(&sampled);
@@ -221,9 +201,9 @@ fn the_table_does_not_depend_on_who_carries_it_out() {
         assert!(child.wait().unwrap().success());
     }
     assert_eq!(table(&scattered), expected);
-    let runs = std::fs::read_to_string(scattered.path("out/runs.csv")).unwrap();
+    let runs = scattered.read("out/runs.csv");
     assert_eq!(column(&runs, "state"), ["done"; 7]);
-    done(&scattered.run(&["report", "out"]));
+    scattered.run(&["report", "out"]).ended(DONE);
     assert!(scattered.path("out/report.html").is_file());
 }
 
@@ -240,14 +220,13 @@ fn saltelli_gives_indices_with_intervals() {
         )
     };
     let place = place(&study_of("saltelli"));
-    let outcome = study(&place, &["--plan"]);
-    done(&outcome);
-    assert!(outcome.stdout.contains("32 runs"), "{}", outcome.stdout);
+    let outcome = study(&place, &["--plan"]).ended(DONE);
+    outcome.prints("32 runs");
     let plan = std::fs::read(place.path("out/runs.csv")).unwrap();
-    done(&study(&place, &["--plan"]));
+    study(&place, &["--plan"]).ended(DONE);
     assert_eq!(std::fs::read(place.path("out/runs.csv")).unwrap(), plan);
-    done(&study(&place, &[]));
-    let effects = std::fs::read_to_string(place.path("out/effects.csv")).unwrap();
+    study(&place, &[]).ended(DONE);
+    let effects = place.read("out/effects.csv");
     assert_eq!(column(&effects, "parameter"), ["stiffness", "title"]);
     let of = |name: &str| -> Vec<f64> {
         let cells = column(&effects, name).into_iter();
@@ -263,7 +242,7 @@ fn saltelli_gives_indices_with_intervals() {
         "{first:?}"
     );
     assert!(of("share_lower")[0] <= first[0] && first[0] <= of("share_upper")[0]);
-    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    let report = place.read("out/report.html");
     for part in [
         "first-order index",
         "total index",
@@ -273,15 +252,15 @@ fn saltelli_gives_indices_with_intervals() {
     }
     // Eight points without order: what does nothing is not called 0.0 %.
     let other = self::place(&study_of("sobol"));
-    done(&study(&other, &[]));
-    let report = std::fs::read_to_string(other.path("out/report.html")).unwrap();
+    study(&other, &[]).ended(DONE);
+    let report = other.read("out/report.html");
     assert!(
         report.contains("not distinguishable from 0 (at most"),
         "{report}"
     );
     assert!(!report.contains(">0.0 %<"));
     assert!(report.contains("digital shift, seed 0"));
-    let runs = std::fs::read_to_string(other.path("out/runs.csv")).unwrap();
+    let runs = other.read("out/runs.csv");
     assert_ne!(column(&runs, "stiffness")[0], "100000.0");
 }
 
@@ -294,13 +273,8 @@ fn runs_that_fail_are_rows_with_their_reason() {
     let place = Place::new();
     place.write("case.toml", sliding());
     place.write("study.toml", list);
-    let outcome = study(&place, &[]);
-    done(&outcome);
-    assert!(
-        outcome.stdout.contains("3 runs: 2 done, 1 no equilibrium"),
-        "{}",
-        outcome.stdout
-    );
+    let outcome = study(&place, &[]).ended(DONE);
+    outcome.prints("3 runs: 2 done, 1 no equilibrium");
     let table = table(&place);
     assert_eq!(column(&table, "status"), ["done", "no equilibrium", "done"]);
     let reason = table.lines().nth(2).unwrap();
@@ -308,7 +282,7 @@ fn runs_that_fail_are_rows_with_their_reason() {
         reason.contains("phase `") && reason.contains("increment"),
         "{reason}"
     );
-    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    let report = place.read("out/report.html");
     assert!(report.contains("1 run could not come to the end"));
     // Its last value is none of the study's.
     assert!(report.contains("1 run has none that counts"), "{report}");
@@ -316,7 +290,7 @@ fn runs_that_fail_are_rows_with_their_reason() {
     let left = |more: &[&str]| study(&place, more).stderr;
     assert!(left(&[]).contains("3 of them done already"));
     assert!(left(&["--retry"]).contains("2 of them done already"));
-    assert_eq!(study(&place, &["--run", "2"]).code, Some(NO_EQUILIBRIUM));
+    study(&place, &["--run", "2"]).ended(NO_EQUILIBRIUM);
 }
 
 /// Rows that a run has passed count, whatever comes later; a grid with a hole has no η².
@@ -332,8 +306,8 @@ fn of_a_run_that_fails_counts_what_it_has_passed() {
     let (_, probes) = probe.split_once("[probes]").unwrap();
     let probe = probes.trim().split([' ', '=', '.']).next().unwrap();
     place.write("study.toml", grid.replace("PROBE", probe));
-    done(&study(&place, &[]));
-    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    study(&place, &[]).ended(DONE);
+    let report = place.read("out/report.html");
     assert!(
         report.contains("The grid has holes, 2 of 6 runs"),
         "{report}"
@@ -356,15 +330,14 @@ fn of_a_run_that_fails_counts_what_it_has_passed() {
 #[test]
 fn an_emptied_history_is_carried_out_again() {
     let place = place(STUDY);
-    done(&study(&place, &[]));
+    study(&place, &[]).ended(DONE);
     let history = place.path("out/00002/history.csv");
     let expected = std::fs::read(&history).unwrap();
     let header = expected.iter().position(|&byte| byte == b'\n').unwrap() + 1;
     for rest in [&[][..], &expected[..header]] {
         std::fs::write(&history, rest).unwrap();
         assert_eq!(column(&table(&place), "status")[1], "lost");
-        let again = study(&place, &[]);
-        done(&again);
+        let again = study(&place, &[]).ended(DONE);
         assert!(
             again.stderr.contains("6 runs, 5 of them done already"),
             "{}",
@@ -383,15 +356,14 @@ fn a_run_that_is_done_outlives_its_library() {
     let library = std::fs::read(ours).unwrap();
     place.write(&format!("laws/{name}"), &library);
     place.write("case.toml", format!("law_path = [\"laws\"]\n{CASE}"));
-    done(&study(&place, &["--run", "1"]));
+    study(&place, &["--run", "1"]).ended(DONE);
     let history = std::fs::read(place.path("out/00001/history.csv")).unwrap();
     place.write(
         &format!("laws/{name}"),
         [library.as_slice(), b"\0"].concat(),
     );
     for _ in 0..2 {
-        let again = study(&place, &["--run", "1"]);
-        assert_eq!(again.code, Some(BAD_INPUT), "{}", again.stderr);
+        study(&place, &["--run", "1"]).ended(BAD_INPUT);
         assert_eq!(column(&table(&place), "status")[0], "done");
     }
     let kept = std::fs::read(place.path("out/00001/history.csv")).unwrap();
@@ -411,26 +383,25 @@ fn a_planned_run_is_refused_beside_runs_of_an_earlier_library() {
     };
     build(b"");
     place.write("case.toml", format!("law_path = [\"laws\"]\n{CASE}"));
-    done(&study(&place, &["--run", "1"]));
-    done(&study(&place, &["--run", "3"]));
+    study(&place, &["--run", "1"]).ended(DONE);
+    study(&place, &["--run", "3"]).ended(DONE);
     build(b"\0");
     for more in [&["--run", "2"][..], &["--run", "3", "--anew"]] {
-        let refused = study(&place, more);
-        assert_eq!(refused.code, Some(BAD_INPUT), "{}", refused.stderr);
+        let refused = study(&place, more).ended(BAD_INPUT);
         let says = "out/00001: it holds a run of another case, with other values, libraries";
-        assert!(refused.says(says), "{}", refused.stderr);
+        refused.shows(says);
     }
     let status = column(&table(&place), "status").join(" ");
     assert_eq!(status, "done planned done planned planned planned");
     // With the earlier one the study goes on; one whose runs are all of the other is of that.
     build(b"");
-    done(&study(&place, &["--run", "2"]));
-    done(&study(&place, &["--anew", "--plan"]));
-    done(&study(&place, &["--run", "1"]));
+    study(&place, &["--run", "2"]).ended(DONE);
+    study(&place, &["--anew", "--plan"]).ended(DONE);
+    study(&place, &["--run", "1"]).ended(DONE);
     build(b"\0");
-    done(&study(&place, &["--run", "1", "--anew"]));
-    done(&study(&place, &["--run", "2"]));
-    done(&study(&place, &[]));
+    study(&place, &["--run", "1", "--anew"]).ended(DONE);
+    study(&place, &["--run", "2"]).ended(DONE);
+    study(&place, &[]).ended(DONE);
 }
 
 /// A law that crashes the process is a row like any other.
@@ -445,8 +416,7 @@ fn a_law_that_crashes_is_a_row_and_the_others_go_on() {
         "case = \"case.toml\"\nmethod = \"list\"\n[[parameter]]\nname = \"limit\"\n\
          key = \"laws.joint.parameters.limit\"\nvalues = [1.0, 1e-6, 1.0]\n",
     );
-    let outcome = study(&place, &[]);
-    done(&outcome);
+    study(&place, &[]).ended(DONE);
     let table = table(&place);
     assert_eq!(
         column(&table, "status"),

@@ -2,7 +2,7 @@
 #![cfg(target_os = "linux")]
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
-use crate::program::{DONE, Place};
+use crate::program::Place;
 use std::ffi::OsString;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -19,14 +19,12 @@ pub(crate) fn case(name: &str) -> String {
 /// What `pilum study` makes of a study of `cases/`, or one by its path, as a table.
 pub(crate) fn by_itself(name: &str) -> String {
     let place = Place::new();
-    let outcome = place.run(&["study", &case(name), "--out", "out"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&["study", &case(name), "--out", "out"]);
     table(&place)
 }
 
 pub(crate) fn table(place: &Place) -> String {
-    let outcome = place.run(&["table", "out"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = place.done(&["table", "out"]);
     outcome.stdout
 }
 
@@ -48,7 +46,7 @@ pub(crate) fn with_pilum(place: &Place, program: &str) -> Command {
 
 /// All runs are done, and the table is the one of the study by itself.
 fn is_that_of_the_study(place: &Place, name: &str) {
-    let written = std::fs::read_to_string(place.path("out/table.csv")).unwrap();
+    let written = place.read("out/table.csv");
     assert_eq!(written, by_itself(name));
     assert!(
         written
@@ -169,8 +167,7 @@ fn indices_of_the_chamber_are_those_of_salib() {
     let runs = study.lines().find(|line| line.starts_with("runs = "));
     let study = study.replace(runs.unwrap(), "runs = 4");
     place.write("study.toml", study.replace("chamber.toml", &chamber));
-    let outcome = place.run(&["study", "study.toml", "--out", "out"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&["study", "study.toml", "--out", "out"]);
     // The column of a table whose cells have no commas.
     let read = |name: &str| {
         let text = std::fs::read_to_string(place.path("out").join(name)).unwrap();

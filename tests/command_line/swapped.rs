@@ -1,9 +1,10 @@
 //! Laws that fail in the zero increment, by which a law that starts takes over the stresses it finds. Also
 //! laws that cannot go on from the internal variables, or the gap, of the law before.
 
-use crate::program::{BAD_INPUT, DONE, JOINT, Outcome, PLUGIN_TROUBLE, Place, edited};
+use crate::program::{DONE, JOINT, Outcome, PLUGIN_TROUBLE, Place, edited};
 use crate::troubled;
 use tests::case::column;
+use tests::tolerance::near;
 
 /// The case with a joint across it, which takes the law after the weight has pressed it.
 fn run(define: &'static str) -> Option<Outcome> {
@@ -33,19 +34,14 @@ fn a_law_that_fails_over_a_nil_increment_starts_with_the_first_one() {
     let Some(outcome) = run("NIL_OUTCOME=PILUM_E_DOMAIN") else {
         return;
     };
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    for words in ["no time passes", "called with zero strain", "phase `push`"] {
-        assert!(outcome.says(words), "{words}: {}", outcome.stderr);
-    }
+    let outcome = outcome.ended(DONE);
+    outcome
+        .shows("no time passes")
+        .shows("called with zero strain")
+        .shows("phase `push`");
     // Asked without trouble, it keeps what it finds, and nothing is said.
-    let outcome = run("").expect("a compiler");
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(
-        !outcome.says("called with zero strain"),
-        "{}",
-        outcome.stderr
-    );
-    assert!(!outcome.says("takes over"), "{}", outcome.stderr);
+    let outcome = run("").expect("a compiler").ended(DONE);
+    outcome.hides("called with zero strain").hides("takes over");
 }
 
 #[test]
@@ -53,14 +49,11 @@ fn a_law_that_breaks_down_over_a_nil_increment_ends_the_run() {
     let Some(outcome) = run("NIL_OUTCOME=PILUM_E_INTERNAL") else {
         return;
     };
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
-    for words in [
-        "no time passes",
-        "phase `push`, increment 1",
-        "group `layer`",
-    ] {
-        assert!(outcome.says(words), "{words}: {}", outcome.stderr);
-    }
+    let outcome = outcome.ended(PLUGIN_TROUBLE);
+    outcome
+        .shows("no time passes")
+        .shows("phase `push`, increment 1")
+        .shows("group `layer`");
 }
 
 /// A strong solid law in the layer, and the same law in a zone of the layer's thickness.
@@ -92,8 +85,7 @@ fn to_zone(solid: &str, first: &str, then: &str) -> String {
 fn internal_variables_of_another_law_with_the_same_id_are_not_read() {
     let place = Place::new();
     let run = |text: String| {
-        let outcome = place.run_case(text);
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        let outcome = place.done_case(text);
         let end = |name| column(&place.path("out/history.csv"), name).pop();
         let ends = ["settlement", "tau"].map(|name| end(name).expect("a row"));
         (outcome, ends)
@@ -105,23 +97,21 @@ fn internal_variables_of_another_law_with_the_same_id_are_not_read() {
         .lines()
         .position(|l| l.contains("laws = {"))
         .expect("the swap");
-    for words in [is_said, &format!("case.toml:{line}:"), "mohr_coulomb"] {
-        assert!(outcome.says(words), "{words}: {}", outcome.stderr);
-    }
+    outcome
+        .shows(is_said)
+        .shows(&format!("case.toml:{line}:"))
+        .shows("mohr_coulomb");
     // Far from its strength it is the elastic law, which has another id.
     let (outcome, expected) = run(to_zone("elastic", "solid", "zone"));
-    assert!(!outcome.says(is_said), "{}", outcome.stderr);
+    outcome.hides(is_said);
     for (found, expected) in found.iter().zip(&expected) {
-        assert!(
-            (found - expected).abs() <= 1e-9 * expected.abs(),
-            "{found} {expected}"
-        );
+        near(*found, *expected, 1e-9 * expected.abs());
     }
     let (outcome, _) = run(to_zone("mohr_coulomb", "zone", "solid"));
-    assert!(outcome.says(is_said), "{}", outcome.stderr);
+    outcome.shows(is_said);
     // The zone itself goes on.
     let (outcome, _) = run(to_zone("mohr_coulomb", "zone", "zone"));
-    assert!(!outcome.says(is_said), "{}", outcome.stderr);
+    outcome.hides(is_said);
 }
 
 /// A joint that is opened by a millimetre before another law takes over.
@@ -149,18 +139,12 @@ fn opened(up: &str) -> String {
 #[test]
 fn a_gap_that_a_swap_forgets_is_told() {
     let place = Place::new();
-    let outcome = place.run_case(opened("1e-3"));
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    for words in [
-        "phase `push`: interface `layer` carries nothing",
-        "law `other` takes over from `joint`, open by up to 1.000e-3 m",
-        "not told of gaps",
-    ] {
-        assert!(outcome.says(words), "{words}: {}", outcome.stderr);
-    }
-    let outcome = place.run_case(opened("-1e-5"));
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(!outcome.says("carries nothing"), "{}", outcome.stderr);
+    let outcome = place.done_case(opened("1e-3"));
+    outcome
+        .shows("phase `push`: interface `layer` carries nothing")
+        .shows("law `other` takes over from `joint`, open by up to 1.000e-3 m")
+        .shows("not told of gaps");
+    place.done_case(opened("-1e-5")).hides("carries nothing");
 }
 
 #[test]
@@ -175,12 +159,8 @@ fn internal_variables_that_a_law_refuses_are_refused_before_the_first_increment(
         .lines()
         .position(|l| l.contains("initial ="))
         .expect("it");
-    let outcome = place.run_case(text);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    for words in [
-        "stress_level is outside [0, 1]",
-        &format!("case.toml:{line}:"),
-    ] {
-        assert!(outcome.says(words), "{words}: {}", outcome.stderr);
-    }
+    let outcome = place.refused_case(text);
+    outcome
+        .shows("stress_level is outside [0, 1]")
+        .shows(&format!("case.toml:{line}:"));
 }

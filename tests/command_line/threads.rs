@@ -25,13 +25,11 @@ fn a_small_run_needs_no_thread() {
     let none = [("LD_PRELOAD", library.to_str().unwrap())];
     // Trying a library that is not known yet takes threads.
     let small = ["run", "case.toml", "--out", "out", "--no-probe"];
-    let outcome = place.run_with(&small, &none);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.run_with(&small, &none).ended(DONE);
     let two = ["run", "case.toml", "--out", "two", "--threads", "2"];
-    let outcome = place.run_with(&two, &none);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    let outcome = place.run_with(&two, &none).ended(BAD_INPUT);
     let text = "start the threads of the run";
-    assert!(outcome.says(text), "{}", outcome.stderr);
+    outcome.shows(text);
 }
 
 /// Each of its points takes 20 ms in the second phase.

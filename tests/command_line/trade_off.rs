@@ -76,8 +76,7 @@ fn implicit(rows: &[Row]) -> Vec<&Row> {
 #[test]
 fn the_error_of_a_driver_falls_with_its_increments_at_first_order() {
     let place = Place::new();
-    let outcome = study(&place, "joint.toml", DRIVER, &["--max-increments", "500"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    study(&place, "joint.toml", DRIVER, &["--max-increments", "500"]).ended(DONE);
     let rows = rows(&place);
     let implicit = implicit(&rows);
     let error = |n: usize| {
@@ -122,8 +121,7 @@ fn the_reference_says_how_far_it_is_converged_and_errors_below_are_marked() {
 #[test]
 fn the_pareto_front_falls_and_nothing_lies_below_it() {
     let place = Place::new();
-    let outcome = study(&place, "joint.toml", DRIVER, &["--max-increments", "50"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    study(&place, "joint.toml", DRIVER, &["--max-increments", "50"]).ended(DONE);
     let point = |row: &Row| (number(row, "cpu_seconds"), number(row, "error"));
     let rows: Vec<Row> = rows(&place)
         .into_iter()
@@ -143,10 +141,9 @@ fn the_pareto_front_falls_and_nothing_lies_below_it() {
 #[test]
 fn draws_the_diagram_and_the_page() {
     let place = Place::new();
-    let outcome = study(&place, "joint.toml", DRIVER, &["--max-increments", "5"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    let svg = std::fs::read_to_string(place.path("out/trade_off.svg")).unwrap();
-    let page = std::fs::read_to_string(place.path("out/trade_off.html")).unwrap();
+    study(&place, "joint.toml", DRIVER, &["--max-increments", "5"]).ended(DONE);
+    let svg = place.read("out/trade_off.svg");
+    let page = place.read("out/trade_off.html");
     let n_rows = rows(&place).len();
     // A mark for every setting at least, and the ring around the default.
     assert!(svg.matches("<circle").count() > n_rows, "{n_rows}");
@@ -160,8 +157,7 @@ fn a_case_is_measured_on_its_mesh_and_against_a_finer_one() {
     // By load alone: viscous control, which `auto` turns to with the fewest increments, comes nearer with these than
     // with more of them.
     let text = edited(HARDENING).replacen("[solver]", "[solver]\ncontrol = \"load\"", 1);
-    let outcome = study(&place, "case.toml", &text, &["--thorough"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    study(&place, "case.toml", &text, &["--thorough"]).ended(DONE);
     let rows = rows(&place);
     let error = |label: &str| {
         let row = rows.iter().find(|row| row["setting"] == label);
@@ -188,8 +184,8 @@ fn proposes_the_stiffness_of_a_joint_from_the_elements_beside_it() {
         "case.toml",
         &edited(JOINT),
         &["--interface-stiffness"],
-    );
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    )
+    .ended(DONE);
     let rows = table(&place.path("out/interface_stiffness.csv"));
     // Soil: E = 1e4 kPa, ν = 0.3, elements 0.5 m high above and below the joint.
     let (young, nu, size) = (1e4, 0.3, 0.5);
@@ -207,7 +203,7 @@ fn proposes_the_stiffness_of_a_joint_from_the_elements_beside_it() {
     assert!(done.len() >= 3, "{rows:?}");
     let penetration: Vec<f64> = done.iter().map(|r| number(r, "penetration")).collect();
     assert!(penetration.is_sorted_by(|a, b| a > b), "{penetration:?}");
-    assert!(outcome.stdout.contains("plateau"), "{}", outcome.stdout);
+    outcome.prints("plateau");
 }
 
 #[test]
@@ -245,11 +241,10 @@ fn refuses_what_it_cannot_study() {
     for (file, text, more, says) in refused {
         let outcome = study(&place, file, text, more);
         assert_eq!(outcome.code, Some(BAD_INPUT), "{says}: {}", outcome.stderr);
-        assert!(outcome.says(says), "{says}: {}", outcome.stderr);
+        outcome.shows(says);
         assert_eq!(outcome.stdout, "");
     }
-    let missing = place.run(&["trade-off", "nothing.toml"]);
-    assert_eq!(missing.code, Some(BAD_INPUT));
+    place.refused(&["trade-off", "nothing.toml"]);
 }
 
 /// Probes of a history by name, with the part of the phase they belong to.
@@ -262,10 +257,8 @@ fn history(place: &Place, folder: &str, increments: usize) -> Vec<Row> {
 
 /// The file after its study, with its summary.
 fn studied(place: &Place, text: String) -> (Outcome, serde_json::Value) {
-    let outcome = place.run_case(text);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    let summary = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
-    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    let outcome = place.done_case(text);
+    let summary = place.summary();
     (outcome, summary["accuracy"].clone())
 }
 
@@ -308,7 +301,7 @@ fn probes_that_are_round_off_do_not_count_and_are_named() {
     assert_eq!(chosen["verdict"], "reached", "{}", outcome.stderr);
     assert_eq!(chosen["zero"], serde_json::json!(["aside", "across"]));
     assert_eq!(chosen["increments"][0][1], 2, "{chosen}");
-    assert!(outcome.says("`aside`, `across` are zero within round-off and do not count"));
+    outcome.shows("`aside`, `across` are zero within round-off and do not count");
     // They are what rounding leaves, or the test shows nothing.
     let rows = table(&place.path("out/history.csv"));
     let most = |probe: &str| {
@@ -325,8 +318,7 @@ fn probes_that_are_round_off_do_not_count_and_are_named() {
     assert_eq!(chosen["zero"], serde_json::json!(["aside", "across"]));
 
     let without = COLUMN.replace("accuracy = 0.01\n", "");
-    let outcome = study(&place, "column.toml", &without, &[]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = study(&place, "column.toml", &without, &[]).ended(DONE);
     let said = outcome
         .stdout
         .contains("`aside`, `across` are zero within round-off");

@@ -26,36 +26,32 @@ fn pinned(sha256: &str) -> String {
 #[test]
 fn a_case_runs_only_with_the_library_it_names() {
     let right = sha256(&shipped("elastic"));
-    let outcome = Place::new().run_case(pinned(&right.to_uppercase()));
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    Place::new()
+        .run_case(pinned(&right.to_uppercase()))
+        .ended(DONE);
 
     let wrong = right.replacen(&right[..1], if &right[..1] == "0" { "1" } else { "0" }, 1);
     let place = Place::new();
-    let outcome = place.run_case(pinned(&wrong));
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
-    for text in [
-        "law `elastic`: library",
-        &format!("found SHA-256 {right}"),
-        &format!("expected {wrong}"),
-        "`sha256` at case.toml:29:10",
-    ] {
-        assert!(outcome.says(text), "{text:?}\n{}", outcome.stderr);
-    }
+    let outcome = place.run_case(pinned(&wrong)).ended(PLUGIN_TROUBLE);
+    outcome
+        .shows("law `elastic`: library")
+        .shows(&format!("found SHA-256 {right}"))
+        .shows(&format!("expected {wrong}"))
+        .shows("`sha256` at case.toml:29:10");
     assert_eq!(place.contents(), ["case.toml"]);
 
-    let outcome = Place::new().run_case(pinned("0123"));
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    assert!(outcome.says("expected 64 hexadecimal digits"));
-    assert!(outcome.says("case.toml:29:10"), "{}", outcome.stderr);
+    let outcome = Place::new().run_case(pinned("0123")).ended(BAD_INPUT);
+    outcome
+        .shows("expected 64 hexadecimal digits")
+        .shows("case.toml:29:10");
 }
 
 #[test]
 fn a_lock_beside_a_case_is_honoured() {
     let place = Place::new();
     place.write("case.toml", CASE);
-    let outcome = place.run(&["lock", "case.toml"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    let lock = std::fs::read_to_string(place.path("case.lock")).unwrap();
+    place.done(&["lock", "case.toml"]);
+    let lock = place.read("case.lock");
     for law in ["elastic", "coulomb_joint"] {
         let library = shipped(law);
         let name = library.file_name().unwrap().to_str().unwrap();
@@ -65,32 +61,29 @@ fn a_lock_beside_a_case_is_honoured() {
         );
         assert!(lock.contains(&entry), "{entry}\nis not in\n{lock}");
     }
-    let outcome = place.run(&["run", "case.toml", "--out", "out"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&["run", "case.toml", "--out", "out"]);
 
     let right = sha256(&shipped("elastic"));
     place.write("case.lock", lock.replace(&right, &"0".repeat(64)));
-    let outcome = place.run(&["run", "case.toml", "--out", "out"]);
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
-    assert!(outcome.says("`sha256` at case.lock:"), "{}", outcome.stderr);
-    assert!(
-        outcome.says("needed by case.toml:28:7"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = place
+        .run(&["run", "case.toml", "--out", "out"])
+        .ended(PLUGIN_TROUBLE);
+    outcome
+        .shows("`sha256` at case.lock:")
+        .shows("needed by case.toml:28:7");
 
     // A law that came later.
     let (_, rest) = lock.split_once("[[law]]").unwrap();
     let (_, last) = rest.split_once("[[law]]").unwrap();
     place.write("case.lock", format!("version = 1\n[[law]]{last}"));
-    let outcome = place.run(&["run", "case.toml", "--out", "out"]);
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
-    assert!(outcome.says("is not in case.lock"), "{}", outcome.stderr);
+    let outcome = place
+        .run(&["run", "case.toml", "--out", "out"])
+        .ended(PLUGIN_TROUBLE);
+    outcome.shows("is not in case.lock");
 
     place.write("case.lock", "version = 2\n");
-    let outcome = place.run(&["run", "case.toml", "--out", "out"]);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    assert!(outcome.says("a lock of version 2"), "{}", outcome.stderr);
+    let outcome = place.refused(&["run", "case.toml", "--out", "out"]);
+    outcome.shows("a lock of version 2");
 }
 
 #[test]
@@ -102,19 +95,17 @@ fn a_driver_has_a_lock_too() {
         "driver.toml",
         troubled::driver("cut").replace("limit = 1.0e-3", "limit = 1.0"),
     );
-    assert_eq!(place.run(&["lock", "driver.toml"]).code, Some(DONE));
+    place.done(&["lock", "driver.toml"]);
     let point = ["point", "driver.toml", "--csv", "out.csv"];
-    assert_eq!(place.run(&point).code, Some(DONE));
+    place.done(&point);
     // The library changes: a byte more.
     let library = place.path(&troubled::library());
     let mut bytes = std::fs::read(&library).unwrap();
     bytes.push(0);
     std::fs::write(&library, bytes).unwrap();
-    let outcome = place.run(&point);
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
-    assert!(outcome.says("driver.lock"), "{}", outcome.stderr);
-    assert_eq!(place.run(&["lock", "driver.toml"]).code, Some(DONE));
-    assert_eq!(place.run(&point).code, Some(DONE));
+    place.run(&point).ended(PLUGIN_TROUBLE).shows("driver.lock");
+    place.done(&["lock", "driver.toml"]);
+    place.done(&point);
 }
 
 #[test]
@@ -145,7 +136,7 @@ fn a_library_that_crashes_does_so_in_a_child() {
             outcome.stderr
         );
         assert!(outcome.says(says), "{define}: {}", outcome.stderr);
-        assert!(outcome.says(&troubled::library()), "{}", outcome.stderr);
+        outcome.shows(&troubled::library());
     }
 }
 
@@ -156,9 +147,10 @@ fn without_a_probe_a_library_that_crashes_is_named() {
         return;
     };
     place.write("driver.toml", troubled::driver("cut"));
-    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv", "--no-probe"]);
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
-    assert!(outcome.says(&troubled::library()), "{}", outcome.stderr);
+    let outcome = place
+        .run(&["point", "driver.toml", "--csv", "out.csv", "--no-probe"])
+        .ended(PLUGIN_TROUBLE);
+    outcome.shows(&troubled::library());
 }
 
 #[test]
@@ -187,16 +179,11 @@ fn libraries_that_everybody_may_change_are_refused() {
         set(mode);
         let outcome = place.run(&point);
         if refused {
-            assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+            let outcome = outcome.ended(PLUGIN_TROUBLE);
             let says = format!("(mode {mode:o})");
-            assert!(
-                outcome.says("can be changed by every user"),
-                "{}",
-                outcome.stderr
-            );
-            assert!(outcome.says(&says), "{}", outcome.stderr);
+            outcome.shows("can be changed by every user").shows(&says);
         } else {
-            assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+            outcome.ended(DONE);
         }
         set(usual);
     }
@@ -209,8 +196,7 @@ fn inspection_runs_nothing() {
         return;
     };
     let library = troubled::library();
-    let outcome = place.run(&["inspect", &library, "--json"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = place.done(&["inspect", &library, "--json"]);
     let found: serde_json::Value = serde_json::from_str(&outcome.stdout).unwrap();
     assert_eq!(found["sha256"], sha256(&place.path(&library)));
     assert_eq!(found["architecture"], std::env::consts::ARCH);
@@ -228,11 +214,10 @@ fn inspection_runs_nothing() {
     assert_eq!(found["remarks"], serde_json::json!([]));
 
     let outcome = place.run(&["inspect", &library]);
-    assert!(outcome.stdout.contains("laws          troubled 1.0\n"));
+    outcome.prints("laws          troubled 1.0\n");
 
     place.write("text", "no library");
-    let outcome = place.run(&["inspect", "text"]);
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
-    assert!(outcome.says("text is no library"), "{}", outcome.stderr);
-    assert_eq!(place.run(&["inspect", "missing"]).code, Some(BAD_INPUT));
+    let outcome = place.run(&["inspect", "text"]).ended(PLUGIN_TROUBLE);
+    outcome.shows("text is no library");
+    place.refused(&["inspect", "missing"]);
 }

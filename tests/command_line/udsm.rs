@@ -1,12 +1,13 @@
 //! User-defined soil models of PLAXIS as laws: sources of `fixtures/udsm`, compiled by gfortran.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
-use crate::program::{BAD_INPUT, CASE, DONE, NO_EQUILIBRIUM, PLUGIN_TROUBLE, Place};
+use crate::program::{BAD_INPUT, CASE, NO_EQUILIBRIUM, PLUGIN_TROUBLE, Place, refuses_file};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 use tempfile::TempDir;
 use tests::case::{column, table};
+use tests::tolerance::near;
 
 /// A folder with `libNAME.so`. `None`, with a remark, where there is no compiler.
 fn place(name: &str, sources: &[&str]) -> Option<Place> {
@@ -45,8 +46,7 @@ const OURS: &str = "young_modulus = 2e4\npoisson_ratio = 0.3\ncohesion = 5.0\n\
 /// Rows of a driver that succeeds.
 fn rows(place: &Place, text: &str) -> Vec<BTreeMap<String, String>> {
     place.write("driver.toml", text);
-    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&["point", "driver.toml", "--csv", "out.csv"]);
     table(&place.path("out.csv"))
 }
 
@@ -134,8 +134,7 @@ fn a_case_with_a_udsm_is_the_case_with_the_law() {
     let ends = |text: String, arguments: &[&str]| {
         place.write("case.toml", text);
         let run = ["run", "case.toml", "--out", "out"];
-        let outcome = place.run(&[&run, arguments].concat());
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        place.done(&[&run, arguments].concat());
         let end = |name| *column(&place.path("out/history.csv"), name).last().unwrap();
         ["settlement", "tau"].map(end)
     };
@@ -158,10 +157,7 @@ fn a_case_with_a_udsm_is_the_case_with_the_law() {
     ] {
         let theirs = ends(with(keys, THEIRS), arguments);
         for (ours, theirs) in ours.iter().zip(theirs) {
-            assert!(
-                (ours - theirs).abs() <= 1e-7 * ours.abs(),
-                "{ours} {theirs}"
-            );
+            near(*ours, theirs, 1e-7 * ours.abs());
         }
     }
 }
@@ -193,10 +189,7 @@ fn arguments_are_true() {
         let found = number(end, &format!("state_{state}"));
         assert!((found - expected).abs() < 1e-12, "{state}: {found}");
     }
-    assert!(
-        (number(end, "state_4") - 0.75e-3).abs() < 1e-15,
-        "strain at the start"
-    );
+    near(number(end, "state_4"), 0.75e-3, 1e-15);
     let (g, lambda) = (2e4 / 2.6, 2e4 * 0.3 / (1.3 * 0.4));
     let expected = -90.0 + (lambda + 2.0 * g) * -2e-3 + lambda * 1e-3 + 5e3 * 1e-3;
     assert!((number(end, "stress_22") - expected).abs() < 1e-10);
@@ -235,8 +228,7 @@ fn a_model_that_depends_on_the_time_is_given_it() {
     for (time, passed) in [("time = 30.0\n", 30.0), ("", 4.0)] {
         let text = text.replacen("increments = 4\n", &format!("increments = 4\n{time}"), 1);
         place.write("driver.toml", text);
-        let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        let outcome = place.done(&["point", "driver.toml", "--csv", "out.csv"]);
         let found = *column(&place.path("out.csv"), "stress_22").last().unwrap();
         let expected = strained - 2.0 * passed;
         assert!(
@@ -277,8 +269,7 @@ fn an_undrained_group_says_so() {
             "flag = { group = \"soil\", quantity = \"state_1\" }\n\n[solver]",
             1,
         );
-    let outcome = place.run_case(text);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done_case(text);
     for row in table(&place.path("out/history.csv")) {
         if number(&row, "increment") > 0.0 {
             let expected = f64::from(u8::from(row["phase"] == "weight"));
@@ -333,18 +324,15 @@ fn what_a_routine_does_wrong_is_named() {
     // The call is kept, and repeated.
     place.write("driver.toml", skewed(ROWS, 1.0, STRAINED));
     place.run(&["point", "driver.toml", "--csv", "out.csv"]);
-    let text = std::fs::read_to_string(place.path("out.failure.toml")).unwrap();
+    let text = place.read("out.failure.toml");
     let capsule: toml::Table = toml::from_str(&text).unwrap();
     let foreign = &capsule["law"]["foreign"];
     assert_eq!(foreign["adapter"].as_str(), Some("udsm"));
     assert_eq!(foreign["tangent_order"].as_str(), Some("rows"));
-    let outcome = place.run(&["replay", "out.failure.toml"]);
-    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
-    assert!(
-        outcome.stdout.contains("as recorded: `cut step`"),
-        "{}",
-        outcome.stdout
-    );
+    let outcome = place
+        .run(&["replay", "out.failure.toml"])
+        .ended(NO_EQUILIBRIUM);
+    outcome.prints("as recorded: `cut step`");
 }
 
 #[test]
@@ -362,10 +350,7 @@ fn a_udsm_fills_a_shear_zone() {
     for row in rows(&place, text) {
         let line = 20e3 / 2.6 * number(&row, "jump_t") / 5e-3;
         let expected = line.min(100.0 * 35_f64.to_radians().sin());
-        assert!(
-            (number(&row, "traction_t") - expected).abs() < 1e-6,
-            "{row:?}"
-        );
+        near(number(&row, "traction_t"), expected, 1e-6);
     }
 }
 
@@ -378,65 +363,45 @@ fn mistakes_are_said_where_they_are_made() {
         "{MOHR_COULOMB}hypothesis = \"plane_strain\"\n[parameters]\n{THEIRS}[[segment]]\n\
          increments = 1\ncontrol = {{ 11 = {{ strain = 1e-3 }} }}\n"
     );
-    for (from, to, code, messages) in [
-        (
-            "\"Mohr_Coulomb\"",
-            "\"Mohr\"",
-            PLUGIN_TROUBLE,
-            &["has no law `Mohr`", "Elastic, Mohr_Coulomb"][..],
-        ),
-        (
-            "phi = 35.0\n",
-            "",
-            BAD_INPUT,
-            &["needs parameter `phi` [deg]", "driver.toml"],
-        ),
-        (
-            "hypothesis",
-            "sidecar = \"libsoils.so\"\nhypothesis",
-            BAD_INPUT,
-            &["`sidecar` is for `adapter = \"umat\"`", "driver.toml"],
-        ),
-        (
-            "hypothesis",
-            "record = \"call.toml\"\nhypothesis",
-            BAD_INPUT,
-            &["`record` is for `adapter = \"umat\"`", "driver.toml"],
-        ),
-        (
-            "\"udsm\"",
-            "\"mfront\"\ntangent_order = \"rows\"",
-            BAD_INPUT,
-            &["`tangent_order` is for `adapter = \"udsm\"`", "driver.toml"],
-        ),
-        (
-            "\"plane_strain\"",
-            "\"interface_2d\"",
-            BAD_INPUT,
-            &[
-                "is made for plane_strain, axisymmetric, 3d",
-                "`adapter = \"shear_zone\"` with a `thickness` makes",
-            ],
-        ),
-    ] {
-        assert!(text.contains(from), "{from}");
-        let text = text.replacen(from, to, 1);
-        let text = if to.contains("interface_2d") {
-            text.replacen("11 = { strain", "t = { jump", 1)
-        } else {
-            text
-        };
-        place.write("driver.toml", text);
-        let outcome = place.run(&["point", "driver.toml"]);
-        assert_eq!(outcome.code, Some(code), "{to}: {}", outcome.stderr);
-        for message in messages {
-            assert!(outcome.says(message), "{to}: {}", outcome.stderr);
-        }
-    }
+    let run = ["point", "driver.toml"];
+    refuses_file(
+        &place,
+        ("driver.toml", &text),
+        &run,
+        PLUGIN_TROUBLE,
+        r#"
+"Mohr_Coulomb" => "Mohr"
+  has no law `Mohr`
+  Elastic, Mohr_Coulomb
+"#,
+    );
+    refuses_file(
+        &place,
+        ("driver.toml", &text),
+        &run,
+        BAD_INPUT,
+        r#"
+phi = 35.0\n =>
+  needs parameter `phi` [deg]
+  driver.toml
+hypothesis => sidecar = "libsoils.so"\nhypothesis
+  `sidecar` is for `adapter = "umat"`
+  driver.toml
+hypothesis => record = "call.toml"\nhypothesis
+  `record` is for `adapter = "umat"`
+  driver.toml
+"udsm" => "mfront"\ntangent_order = "rows"
+  `tangent_order` is for `adapter = "udsm"`
+  driver.toml
+"plane_strain" => "interface_2d"
+  11 = { strain => t = { jump
+  is made for plane_strain, axisymmetric, 3d
+  `adapter = "shear_zone"` with a `thickness` makes
+"#,
+    );
     // Another kind of library; nothing of the routine's runs before it is asked for.
     place.write("libsoils.so", b"no library");
     place.write("driver.toml", text);
-    let outcome = place.run(&["point", "driver.toml"]);
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
-    assert!(outcome.says("libsoils.so"), "{}", outcome.stderr);
+    let outcome = place.run(&["point", "driver.toml"]).ended(PLUGIN_TROUBLE);
+    outcome.shows("libsoils.so");
 }

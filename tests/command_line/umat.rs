@@ -91,8 +91,7 @@ fn driver(name: &str, keys: &str, parameters: &str) -> String {
 /// Runs a driver; the rows of its table.
 fn rows(place: &Place, text: &str) -> Vec<BTreeMap<String, String>> {
     place.write("driver.toml", text);
-    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&["point", "driver.toml", "--csv", "out.csv"]);
     table(&place.path("out.csv"))
 }
 
@@ -119,13 +118,11 @@ fn an_elastic_umat_is_the_elastic_law() {
     let Some(place) = place("elastic") else {
         return;
     };
-    let outcome = place.run_case(CASE);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done_case(CASE);
     let ours = last(&place);
     let mut all = Vec::new();
     for keys in ["", "in_process = true"] {
-        let outcome = place.run_case(soil("elastic", keys));
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        place.done_case(soil("elastic", keys));
         all.push(last(&place));
     }
     for (umat, ours) in all[0].iter().zip(&ours) {
@@ -217,8 +214,7 @@ fn a_soil_that_flows_converges_with_the_tangent_of_its_routine() {
             "flow = { group = \"soil\", quantity = \"multiplier\" }\n\n[solver]",
             1,
         );
-    let outcome = place.run_case(text);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done_case(text);
     let rows = table(&place.path("out/history.csv"));
     assert!(number(rows.last().unwrap(), "flow") > 1e-3);
     let most = rows.iter().map(|row| number(row, "iterations"));
@@ -269,8 +265,7 @@ fn elements_say_where_they_are() {
         return;
     };
     let text = soil("echo", "").replacen("profile = \"phases\"", "points = \"phases\"", 1);
-    let outcome = place.run_case(text);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done_case(text);
     let rows = table(&place.path("out/points.csv"));
     let rows = rows.into_iter();
     let rows = rows.filter(|row| row["group"] == "soil" && row["phase"] == "push");
@@ -303,9 +298,8 @@ fn a_routine_that_asks_for_smaller_steps_gets_them() {
     };
     let text = driver("smaller", "", "largest = 3e-5");
     place.write("driver.toml", &text);
-    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(!outcome.says(" 0 cut-backs"), "{}", outcome.stderr);
+    let outcome = place.done(&["point", "driver.toml", "--csv", "out.csv"]);
+    outcome.hides(" 0 cut-backs");
     let rows = table(&place.path("out.csv"));
     let end = rows.last().unwrap();
     // σ₁₁ = (λ + 2G) ε₁₁ + λ ε₂₂.
@@ -320,9 +314,7 @@ fn a_routine_that_asks_for_smaller_steps_gets_them() {
         1,
     );
     let outcome = place.run_case(case);
-    for text in ["group `soil`, element", "PNEWDT = 0.5"] {
-        assert!(outcome.says(text), "{text}\n{}", outcome.stderr);
-    }
+    outcome.shows("group `soil`, element").shows("PNEWDT = 0.5");
 }
 
 #[test]
@@ -360,8 +352,7 @@ fn has_variables_of_its_own(name: &str) {
     );
     let text = text.replace("saves", name);
     for keys in ["", "in_process = true"] {
-        let outcome = place.run_case(text.replace("KEYS", keys));
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        place.done_case(text.replace("KEYS", keys));
         let rows = table(&place.path("out/history.csv"));
         let row = rows.last().unwrap();
         assert_eq!(number(row, "tau"), 1e4, "{keys}");
@@ -374,21 +365,17 @@ fn a_zone_has_no_two_variables_of_one_name() {
     let Some(place) = place("elastic") else {
         return;
     };
-    let sidecar = std::fs::read_to_string(place.path("elastic.law.toml")).unwrap();
+    let sidecar = place.read("elastic.law.toml");
     let variable = "[[internal]]\nid = \"zone_stress_11\"\nunit = \"kPa\"\ndoc = \"a stress\"\n";
     place.write("elastic.law.toml", format!("{sidecar}\n{variable}"));
     let zone = "law = \"soil\"\nadapter = \"shear_zone\"\nthickness = 0.01\nhypothesis = \"interface_2d\"\n\
                 segment = [{ increments = 4, control = { t = { jump = 1e-3 } } }]\n[laws.soil]\nlaw = \"umat_elastic\"\n\
                 adapter = \"umat\"\nlibrary = \"libelastic.so\"\nparameters = { young_modulus = 2e4 }\n";
     place.write("zone.toml", zone);
-    let outcome = place.run(&["point", "zone.toml", "--csv", "out.csv"]);
-    assert_eq!(outcome.code, Some(1), "{}", outcome.stderr);
-    assert!(
-        outcome
-            .says("internal variable `zone_stress_11`, as the zone calls one of its own stresses"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = place
+        .run(&["point", "zone.toml", "--csv", "out.csv"])
+        .ended(1);
+    outcome.shows("internal variable `zone_stress_11`, as the zone calls one of its own stresses");
 }
 
 #[test]
@@ -407,30 +394,21 @@ fn six_components_stand_for_four_only_where_that_is_declared() {
         assert!((six - own).abs() <= 1e-12 * own.abs(), "{six} {own}");
     }
 
-    let sidecar = std::fs::read_to_string(place.path("six.law.toml")).unwrap();
+    let sidecar = place.read("six.law.toml");
     place.write("driver.toml", driver("six", "", ""));
     place.write("six.law.toml", sidecar.replacen("expand = true", "", 1));
-    let outcome = place.run(&["point", "driver.toml"]);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    for text in [
-        "six.law.toml:2",
-        "plane_strain has NTENS = 4, which `ntens` lacks",
-        "expand = true",
-    ] {
-        assert!(outcome.says(text), "{text}\n{}", outcome.stderr);
-    }
+    let outcome = place.refused(&["point", "driver.toml"]);
+    outcome
+        .shows("six.law.toml:2")
+        .shows("plane_strain has NTENS = 4, which `ntens` lacks")
+        .shows("expand = true");
     // A sidecar that is wrong about the routine is found out.
     place.write(
         "six.law.toml",
         sidecar.replacen("ntens = [6]", "ntens = [4, 6]", 1),
     );
-    let outcome = place.run(&["point", "driver.toml"]);
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
-    assert!(
-        outcome.says("writes beyond the end of"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = place.run(&["point", "driver.toml"]).ended(PLUGIN_TROUBLE);
+    outcome.shows("writes beyond the end of");
 }
 
 #[test]
@@ -444,8 +422,7 @@ fn an_interface_with_two_components() {
         "law = \"umat_joint\"\nadapter = \"umat\"\nlibrary = \"libjoint.so\"\n\
          [laws.joint.parameters]\nnormal_stiffness = 1e6\nshear_stiffness = 4e5\nfriction = 0.5",
     )]);
-    let outcome = place.run_case(case);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done_case(case);
 
     let driver = "law = \"umat_joint\"\nadapter = \"umat\"\nlibrary = \"libjoint.so\"\n\
         hypothesis = \"interface_2d\"\n\
@@ -492,7 +469,7 @@ fn utility_routines_are_there() {
 
 /// The value of an argument in a record.
 fn recorded(place: &Place, file: &str, when: &str, name: &str) -> Vec<f64> {
-    let text = std::fs::read_to_string(place.path(file)).unwrap();
+    let text = place.read(file);
     let call: toml::Table = toml::from_str(&text).unwrap();
     let values = call[when][name].as_array().unwrap().iter();
     values.map(|value| value.as_float().unwrap()).collect()

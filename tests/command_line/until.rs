@@ -1,15 +1,14 @@
 //! Phases that end where a quantity reaches a value.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
-use crate::program::{BAD_INPUT, DONE, Edit, Outcome, Place, edited, refuses};
+use crate::program::{Edit, Outcome, Place, edited, refuses};
 
 /// Settlement of the block under the whole pressure, in the unit of its probe: it is linear but for the joint.
 fn run(edits: &[Edit]) -> (Outcome, Vec<Vec<String>>) {
     let place = Place::new();
     place.write("case.toml", edited(edits));
-    let outcome = place.run(&["run", "case.toml", "--out", "out"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    let history = std::fs::read_to_string(place.path("out/history.csv")).unwrap();
+    let outcome = place.done(&["run", "case.toml", "--out", "out"]);
+    let history = place.read("out/history.csv");
     let rows = history.lines().skip(1);
     let rows = rows.map(|row| row.split(',').map(str::to_owned).collect());
     (outcome, rows.collect())
@@ -42,11 +41,7 @@ fn a_phase_ends_where_its_quantity_reaches_the_value() {
             until.leak(),
         ),
     ]);
-    assert!(
-        outcome.says("`settlement` has reached"),
-        "{}",
-        outcome.stderr
-    );
+    outcome.shows("`settlement` has reached");
     let ended = of_phase(&rows, "weight");
     let [time, below, settlement] = *ended.last().unwrap();
     assert!(
@@ -77,12 +72,9 @@ fn what_is_reached_already_takes_no_increment() {
         "{}",
         outcome.stderr
     );
-    assert!(
-        outcome.says("phase push: no increment: `settlement` is ")
-            && outcome.says("at its start, already beyond 0.01"),
-        "{}",
-        outcome.stderr
-    );
+    outcome
+        .shows("phase push: no increment: `settlement` is ")
+        .shows("at its start, already beyond 0.01");
 }
 
 /// Half of the excess pressure is left where the phase that drains ends; it stays, and the ground settles no more.
@@ -123,42 +115,24 @@ fn what_is_not_reached_is_said() {
         ),
     ]);
     assert_eq!(of_phase(&rows, "push").len(), 2);
-    assert!(
-        outcome.says("`settlement` has not reached 1000"),
-        "{}",
-        outcome.stderr
-    );
+    outcome.shows("`settlement` has not reached 1000");
 }
 
 #[test]
 fn refuses_what_would_be_left_half_done() {
     refuses(
-        BAD_INPUT,
-        &[
-            (
-                "no such quantity",
-                &[(
-                    "name = \"push\"",
-                    "name = \"push\"\nuntil = { quantity = ^\"setlement\", reaches = 1.0 }",
-                )],
-                &["`setlement`", "did you mean `settlement`?"],
-            ),
-            (
-                "a change of laws",
-                &[(
-                    "name = \"push\"",
-                    "name = \"push\"\nlaws = { layer = \"joint\" }\nuntil = ^{ quantity = \"settlement\", reaches = 1.0 }",
-                )],
-                &["`until` may end this phase before its time", "`laws`"],
-            ),
-            (
-                "a strain",
-                &[(
-                    "name = \"push\"",
-                    "name = \"push\"\nstrain = { soil = 1e-5 }\nuntil = ^{ quantity = \"settlement\", reaches = 1.0 }",
-                )],
-                &["`strain` would be left half done"],
-            ),
-        ],
+        r#"
+no such quantity
+  name = "push" => name = "push"\nuntil = { quantity = ^"setlement", reaches = 1.0 }
+  `setlement`
+  did you mean `settlement`?
+a change of laws
+  name = "push" => name = "push"\nlaws = { layer = "joint" }\nuntil = ^{ quantity = "settlement", reaches = 1.0 }
+  `until` may end this phase before its time
+  `laws`
+a strain
+  name = "push" => name = "push"\nstrain = { soil = 1e-5 }\nuntil = ^{ quantity = "settlement", reaches = 1.0 }
+  `strain` would be left half done
+"#,
     );
 }

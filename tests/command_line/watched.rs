@@ -42,8 +42,7 @@ fn a_program_that_has_threads_already_is_not_watched() {
     let warning = "the program has threads already";
     let preloaded = [("LD_PRELOAD", library.to_str().unwrap())];
     for (variables, is_warned) in [(&[][..], false), (&preloaded[..], true)] {
-        let outcome = place.run_with(&run, variables);
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        let outcome = place.run_with(&run, variables).ended(DONE);
         assert_eq!(outcome.says(warning), is_warned, "{}", outcome.stderr);
     }
 }

@@ -206,107 +206,47 @@ fn a_call_that_crashes_can_be_repeated() {
     }
 }
 
-/// Crashes of a library outside the calls of laws: the definitions of the fixture, the check that crashes,
-/// the phase in its capsule, and the output of replaying it.
-const PHASES: [(&str, &str, &str, &str, &str); 13] = [
-    (
-        "load_crashes",
-        "__attribute__((constructor)) static void begins(void) { *(volatile int *)16 = 0; }",
-        "library-opens",
-        "load",
-        "the library crashed: signal 11 (segmentation fault)",
-    ),
-    (
-        "load_exits",
-        "#include <stdlib.h>\n__attribute__((constructor)) static void begins(void) { exit(1); }",
-        "library-opens",
-        "load",
-        "the library ended its process: exit code 1",
-    ),
-    (
-        "load_hangs",
-        "__attribute__((constructor)) static void begins(void) { for (;;) { __asm__ volatile(\"\"); } }",
-        "library-opens",
-        "load",
-        "the library does not return",
-    ),
-    (
-        "entry_aborts",
-        "#define IN_ENTRY abort()",
-        "entry-is-idempotent",
-        "entry",
-        "the library crashed: signal 6 (aborted)",
-    ),
-    (
-        "entry_exits",
-        "#define IN_ENTRY exit(0)",
-        "entry-is-idempotent",
-        "entry",
-        "the library ended its process: exit code 0",
-    ),
-    (
-        "entry_hangs",
-        "#define IN_ENTRY for (;;) { __asm__ volatile(\"\"); }",
-        "entry-is-idempotent",
-        "entry",
-        "the library does not return",
-    ),
-    (
-        "description_is_nowhere",
-        "#define IN_ENTRY return (const pilum_plugin *)16",
-        "description-is-readable",
-        "describe",
-        "the library crashed: signal 11 (segmentation fault)",
-    ),
-    (
-        "destroy_null",
-        "#define IN_DESTROY ((volatile double *)instance->stiffness)[0] = 0.0",
-        "create-works",
-        "destroy_null",
-        "the library crashed: signal 11 (segmentation fault)",
-    ),
-    (
-        "destroy_exits",
-        "#define IN_DESTROY if (instance) exit(3)",
-        "create-works",
-        "destroy",
-        "the law ended its process: exit code 3",
-    ),
-    (
-        "destroy_hangs",
-        "#define IN_DESTROY while (instance) { __asm__ volatile(\"\"); }",
-        "create-works",
-        "destroy",
-        "the law does not return",
-    ),
-    (
-        "destroy_after_use",
-        "static int used;\n#define IN_INTEGRATE used = 1\n\
-         #define IN_DESTROY if (used && instance) abort()",
-        "integrate-works",
-        "destroy",
-        "the law crashed: signal 6 (aborted)",
-    ),
-    (
-        "end_aborts",
-        "#include <stdlib.h>\n__attribute__((destructor)) static void ends(void) { abort(); }",
-        "library-opens",
-        "exit",
-        "the library crashed: signal 6 (aborted)",
-    ),
-    (
-        "end_exits",
-        "#include <unistd.h>\n__attribute__((destructor)) static void ends(void) { _exit(4); }",
-        "library-opens",
-        "exit",
-        "the library ended its process: exit code 4",
-    ),
-];
+/// Crashes of a library outside the calls of laws: a name, the check that crashes, the phase in its capsule, and the
+/// output of replaying it; the definitions of the fixture, with `\n` for the end of a line.
+const PHASES: &str = r#"
+load_crashes library-opens load the library crashed: signal 11 (segmentation fault)
+  __attribute__((constructor)) static void begins(void) { *(volatile int *)16 = 0; }
+load_exits library-opens load the library ended its process: exit code 1
+  #include <stdlib.h>\n__attribute__((constructor)) static void begins(void) { exit(1); }
+load_hangs library-opens load the library does not return
+  __attribute__((constructor)) static void begins(void) { for (;;) { __asm__ volatile(""); } }
+entry_aborts entry-is-idempotent entry the library crashed: signal 6 (aborted)
+  #define IN_ENTRY abort()
+entry_exits entry-is-idempotent entry the library ended its process: exit code 0
+  #define IN_ENTRY exit(0)
+entry_hangs entry-is-idempotent entry the library does not return
+  #define IN_ENTRY for (;;) { __asm__ volatile(""); }
+description_is_nowhere description-is-readable describe the library crashed: signal 11 (segmentation fault)
+  #define IN_ENTRY return (const pilum_plugin *)16
+destroy_null create-works destroy_null the library crashed: signal 11 (segmentation fault)
+  #define IN_DESTROY ((volatile double *)instance->stiffness)[0] = 0.0
+destroy_exits create-works destroy the law ended its process: exit code 3
+  #define IN_DESTROY if (instance) exit(3)
+destroy_hangs create-works destroy the law does not return
+  #define IN_DESTROY while (instance) { __asm__ volatile(""); }
+destroy_after_use integrate-works destroy the law crashed: signal 6 (aborted)
+  static int used;\n#define IN_INTEGRATE used = 1\n#define IN_DESTROY if (used && instance) abort()
+end_aborts library-opens exit the library crashed: signal 6 (aborted)
+  #include <stdlib.h>\n__attribute__((destructor)) static void ends(void) { abort(); }
+end_exits library-opens exit the library ended its process: exit code 4
+  #include <unistd.h>\n__attribute__((destructor)) static void ends(void) { _exit(4); }
+"#;
 
 /// What crashes on opening, in `destroy` or at the end of the process can be repeated as calls can.
 #[test]
 fn a_crash_where_no_law_is_called_can_be_repeated() {
-    for (name, definitions, id, phase, says) in PHASES {
+    let rows: Vec<&str> = PHASES.lines().skip(1).collect();
+    for row in rows.chunks(2) {
+        let words: Vec<&str> = row[0].splitn(4, ' ').collect();
+        let [name, id, phase, says] = words[..] else {
+            panic!("{row:?}")
+        };
+        let definitions = &row[1].replace("\\n", "\n");
         let folder = folder();
         let Some(library) = compiled_with(definitions, name, folder.path()) else {
             return;
@@ -527,7 +467,7 @@ fn a_program_whose_file_is_gone_goes_on() {
     let script = "cp \"$0\" gone && exec 3< gone && rm gone && exec /proc/self/fd/3 check \"$1\" --only repeatable";
     let output = std::process::Command::new("sh")
         .args(["-c", script])
-        .arg(crate::program::program())
+        .arg(tests::place::built_program())
         .arg(&library)
         .current_dir(folder.path())
         .output()

@@ -2,24 +2,11 @@
 #![expect(clippy::unwrap_used, clippy::panic, reason = "part of the tests")]
 
 use serde_json::Value;
-use std::env::consts::{DLL_PREFIX, DLL_SUFFIX, EXE_SUFFIX};
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use tempfile::TempDir;
-
-/// Folder of this test and of the libraries of Rust laws.
-fn deps() -> PathBuf {
-    std::env::current_exe()
-        .unwrap()
-        .parent()
-        .unwrap()
-        .to_owned()
-}
-
-/// The program.
-pub(crate) fn program() -> PathBuf {
-    deps().parent().unwrap().join(format!("pilum{EXE_SUFFIX}"))
-}
+use tests::place::{built_program, deps};
 
 /// Runs the program.
 pub(crate) fn pilum(arguments: &[&str]) -> Output {
@@ -28,13 +15,7 @@ pub(crate) fn pilum(arguments: &[&str]) -> Output {
 
 /// Runs the program in a folder.
 pub(crate) fn pilum_in(folder: &Path, arguments: &[&str]) -> Output {
-    let program = program();
-    assert!(
-        program.is_file(),
-        "{} is missing: `cargo build --release` builds it",
-        program.display()
-    );
-    Command::new(program)
+    Command::new(built_program())
         .args(arguments)
         .current_dir(folder)
         .env_remove("PILUM_LAW_PATH")

@@ -16,271 +16,78 @@ use tempfile::TempDir;
 use tests::case::Silent;
 use tests::figure::{alike, bless};
 
-/// An input file in `cases/`; one of its variants, or nothing for all of them together; what the
-/// committed files are called, `*` standing for the figure; the figures.
-type Committed = (
-    &'static str,
-    &'static str,
-    &'static str,
-    &'static [&'static str],
-);
+/// An input file in `cases/`; one of its variants, or `-` for all of them together; what the committed files are
+/// called, `*` standing for the figure; the figures.
+const COMMITTED: &str = "
+calibrate_mepi/calibration.toml - * fit_traction_t_over_u_t fit_u_n_over_u_t prediction_u_n_over_u_t
+calibrate_mepi/calibration.toml - * profile_a
+calibrate_stiffness/calibration.toml - * fit_sigma_n_over_u_t prediction_traction_t_over_u_t
+calibrate_pile/calibration.toml - * fit_pile_head_load_over_pile_settlement
+calibrate_pile/calibration.toml - * fit_gauge_2_over_pile_settlement profile_shear_stiffness
+bored_pile/case.toml - * loads axial_force
+textbook_pile/case.toml - * loads axial_force
+hardening_piles/bored.toml - * bored_loads
+hardening_piles/textbook.toml - * textbook_loads
+hardening_piles/measured.toml - * load_settlement
+hardening_soil_tests/triaxial.toml - * triaxial
+hardening_soil_tests/oedometer.toml - * oedometer
+hardening_soil_tests/undrained.toml - * undrained
+calibrate_hardening_soil/calibration.toml - * fit_stress_22_over_strain_22
+calibrate_hardening_soil/calibration.toml - * fit_strain_11_over_strain_22
+tension_pile/case.toml - * loads axial_force
+cyclic_head_load/case.toml - * loads axial_force
+residual_stress/case.toml - * loads axial_force
+footing/case.toml - * bearing_capacity
+measured_pile_oneill/case.toml - * load_settlement
+measured_interface_praai/driver.toml - * shear_stress normal_stress
+measured_interface_praai/state.toml - * cycles_normal_stress cycles_slip
+settling_clay_pile/case.toml floating *_floating axial_force
+settling_clay_pile/case.toml on_rock *_on_rock axial_force
+settling_clay_pile/case.toml floating * shaft_friction
+belled_pile/case.toml pushed * loads axial_force
+raft_pile/case.toml clay * shares contact_pressure
+pushed_pulled_pile/case.toml - * loads
+energy_pile/case.toml - * axial_force
+aspect_ratio/case.toml - aspect_ratio_* tau u_n
+aspect_ratio/joint.toml - joint_* tau
+aspect_ratio/constant_volume.toml - constant_volume_* tau sigma_n
+aspect_ratio/constant_volume_joint.toml - constant_volume_joint_* sigma_n
+aspect_ratio/constant_modulus.toml - constant_modulus_* sigma_n
+chamber_confinement/case.toml - * k_0_a k_0_b k_0_c
+chamber_instability/case.toml - * normal_stress
+chamber_interface_model/case.toml - * friction normal_stress
+chamber_interface_model/dilating.toml - *_dilating friction normal_stress
+chamber_loading/case.toml - * friction lateral_pressure
+chamber_loading/case.toml dilating * loads friction_along_shaft normal_stress_along_shaft settlement
+chamber_mesh/case.toml - * head_load normal_stress friction_along_shaft normal_stress_along_shaft
+chamber_mesh1/case.toml - * mobilisation loads
+chamber_soil_law/case.toml - * friction normal_stress toe_load
+joint_laws/hyperbolic.toml - * hyperbolic_tau
+joint_laws/cyclic.toml - * cyclic_tau cyclic_sigma_n
+joint_laws/load_transfer.toml - * load_transfer_tau
+shear_box/fontainebleau.toml - * fontainebleau_tau fontainebleau_mu fontainebleau_u_n
+shear_box/fontainebleau_softening.toml - * softening_tau softening_mu softening_u_n
+shear_box/silica.toml - * silica_tau silica_mu silica_sigma_n silica_u_n
+shear_zone/mohr_coulomb.toml - mohr_coulomb_* tau u_n
+";
 
-const COMMITTED: &[Committed] = &[
-    (
-        "calibrate_mepi/calibration.toml",
-        "",
-        "*",
-        &[
-            "fit_traction_t_over_u_t",
-            "fit_u_n_over_u_t",
-            "prediction_u_n_over_u_t",
-            "profile_a",
-        ],
-    ),
-    (
-        "calibrate_stiffness/calibration.toml",
-        "",
-        "*",
-        &["fit_sigma_n_over_u_t", "prediction_traction_t_over_u_t"],
-    ),
-    (
-        "calibrate_pile/calibration.toml",
-        "",
-        "*",
-        &[
-            "fit_pile_head_load_over_pile_settlement",
-            "fit_gauge_2_over_pile_settlement",
-            "profile_shear_stiffness",
-        ],
-    ),
-    ("bored_pile/case.toml", "", "*", &["loads", "axial_force"]),
-    (
-        "textbook_pile/case.toml",
-        "",
-        "*",
-        &["loads", "axial_force"],
-    ),
-    ("hardening_piles/bored.toml", "", "*", &["bored_loads"]),
-    (
-        "hardening_piles/textbook.toml",
-        "",
-        "*",
-        &["textbook_loads"],
-    ),
-    (
-        "hardening_piles/measured.toml",
-        "",
-        "*",
-        &["load_settlement"],
-    ),
-    ("hardening_soil_tests/triaxial.toml", "", "*", &["triaxial"]),
-    (
-        "hardening_soil_tests/oedometer.toml",
-        "",
-        "*",
-        &["oedometer"],
-    ),
-    (
-        "hardening_soil_tests/undrained.toml",
-        "",
-        "*",
-        &["undrained"],
-    ),
-    (
-        "calibrate_hardening_soil/calibration.toml",
-        "",
-        "*",
-        &[
-            "fit_stress_22_over_strain_22",
-            "fit_strain_11_over_strain_22",
-        ],
-    ),
-    ("tension_pile/case.toml", "", "*", &["loads", "axial_force"]),
-    (
-        "cyclic_head_load/case.toml",
-        "",
-        "*",
-        &["loads", "axial_force"],
-    ),
-    (
-        "residual_stress/case.toml",
-        "",
-        "*",
-        &["loads", "axial_force"],
-    ),
-    ("footing/case.toml", "", "*", &["bearing_capacity"]),
-    (
-        "measured_pile_oneill/case.toml",
-        "",
-        "*",
-        &["load_settlement"],
-    ),
-    (
-        "measured_interface_praai/driver.toml",
-        "",
-        "*",
-        &["shear_stress", "normal_stress"],
-    ),
-    (
-        "measured_interface_praai/state.toml",
-        "",
-        "*",
-        &["cycles_normal_stress", "cycles_slip"],
-    ),
-    (
-        "settling_clay_pile/case.toml",
-        "floating",
-        "*_floating",
-        &["axial_force"],
-    ),
-    (
-        "settling_clay_pile/case.toml",
-        "on_rock",
-        "*_on_rock",
-        &["axial_force"],
-    ),
-    (
-        "settling_clay_pile/case.toml",
-        "floating",
-        "*",
-        &["shaft_friction"],
-    ),
-    (
-        "belled_pile/case.toml",
-        "pushed",
-        "*",
-        &["loads", "axial_force"],
-    ),
-    (
-        "raft_pile/case.toml",
-        "clay",
-        "*",
-        &["shares", "contact_pressure"],
-    ),
-    ("pushed_pulled_pile/case.toml", "", "*", &["loads"]),
-    ("energy_pile/case.toml", "", "*", &["axial_force"]),
-    (
-        "aspect_ratio/case.toml",
-        "",
-        "aspect_ratio_*",
-        &["tau", "u_n"],
-    ),
-    ("aspect_ratio/joint.toml", "", "joint_*", &["tau"]),
-    (
-        "aspect_ratio/constant_volume.toml",
-        "",
-        "constant_volume_*",
-        &["tau", "sigma_n"],
-    ),
-    (
-        "aspect_ratio/constant_volume_joint.toml",
-        "",
-        "constant_volume_joint_*",
-        &["sigma_n"],
-    ),
-    (
-        "aspect_ratio/constant_modulus.toml",
-        "",
-        "constant_modulus_*",
-        &["sigma_n"],
-    ),
-    (
-        "chamber_confinement/case.toml",
-        "",
-        "*",
-        &["k_0_a", "k_0_b", "k_0_c"],
-    ),
-    ("chamber_instability/case.toml", "", "*", &["normal_stress"]),
-    (
-        "chamber_interface_model/case.toml",
-        "",
-        "*",
-        &["friction", "normal_stress"],
-    ),
-    (
-        "chamber_interface_model/dilating.toml",
-        "",
-        "*_dilating",
-        &["friction", "normal_stress"],
-    ),
-    (
-        "chamber_loading/case.toml",
-        "",
-        "*",
-        &["friction", "lateral_pressure"],
-    ),
-    (
-        "chamber_loading/case.toml",
-        "dilating",
-        "*",
-        &[
-            "loads",
-            "friction_along_shaft",
-            "normal_stress_along_shaft",
-            "settlement",
-        ],
-    ),
-    (
-        "chamber_mesh/case.toml",
-        "",
-        "*",
-        &[
-            "head_load",
-            "normal_stress",
-            "friction_along_shaft",
-            "normal_stress_along_shaft",
-        ],
-    ),
-    (
-        "chamber_mesh1/case.toml",
-        "",
-        "*",
-        &["mobilisation", "loads"],
-    ),
-    (
-        "chamber_soil_law/case.toml",
-        "",
-        "*",
-        &["friction", "normal_stress", "toe_load"],
-    ),
-    ("joint_laws/hyperbolic.toml", "", "*", &["hyperbolic_tau"]),
-    (
-        "joint_laws/cyclic.toml",
-        "",
-        "*",
-        &["cyclic_tau", "cyclic_sigma_n"],
-    ),
-    (
-        "joint_laws/load_transfer.toml",
-        "",
-        "*",
-        &["load_transfer_tau"],
-    ),
-    (
-        "shear_box/fontainebleau.toml",
-        "",
-        "*",
-        &["fontainebleau_tau", "fontainebleau_mu", "fontainebleau_u_n"],
-    ),
-    (
-        "shear_box/fontainebleau_softening.toml",
-        "",
-        "*",
-        &["softening_tau", "softening_mu", "softening_u_n"],
-    ),
-    (
-        "shear_box/silica.toml",
-        "",
-        "*",
-        &["silica_tau", "silica_mu", "silica_sigma_n", "silica_u_n"],
-    ),
-    (
-        "shear_zone/mohr_coulomb.toml",
-        "",
-        "mohr_coulomb_*",
-        &["tau", "u_n"],
-    ),
-];
+/// Input file, variant, committed file, and figure, of each.
+fn committed() -> impl Iterator<Item = (&'static str, &'static str, PathBuf, &'static str)> {
+    COMMITTED.lines().skip(1).flat_map(|row| {
+        let words: Vec<&str> = row.split(' ').collect();
+        let (input, variant) = (words[0], words[1].trim_matches('-'));
+        let files = words[3..].iter().map(|figure| {
+            let name = format!("{}.svg", words[2].replace('*', figure));
+            (
+                input,
+                variant,
+                cases().join(input).with_file_name(name),
+                *figure,
+            )
+        });
+        files.collect::<Vec<_>>()
+    })
+}
 
 fn cases() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../cases")
@@ -339,11 +146,7 @@ fn draw(input: &str) -> TempDir {
 
 #[test]
 fn every_figure_has_its_case() {
-    let named = COMMITTED.iter().flat_map(|(input, _, name, figures)| {
-        let folder = cases().join(input).parent().unwrap().to_owned();
-        let path = move |figure: &&str| folder.join(format!("{}.svg", name.replace('*', figure)));
-        figures.iter().map(path)
-    });
+    let named = committed().map(|(_, _, file, _)| file);
     assert_eq!(named.collect::<BTreeSet<_>>(), pictures());
 }
 
@@ -351,22 +154,18 @@ fn every_figure_has_its_case() {
 fn the_committed_figures_are_those_of_the_cases() {
     let mut places: BTreeMap<&str, TempDir> = BTreeMap::new();
     let mut differing = Vec::new();
-    for &(input, variant, name, figures) in COMMITTED {
+    for (input, variant, file, figure) in committed() {
         let place = places.entry(input).or_insert_with(|| draw(input));
-        for figure in figures {
-            let drawn = place.path().join(variant).join(format!("{figure}.svg"));
-            let drawn = std::fs::read_to_string(drawn).unwrap();
-            let name = format!("{}.svg", name.replace('*', figure));
-            let path = cases().join(input).with_file_name(name);
-            let committed = std::fs::read_to_string(&path).unwrap_or_default();
-            if alike(&committed, &drawn) {
-                continue;
-            }
-            if bless() {
-                std::fs::write(path, drawn).unwrap();
-            } else {
-                differing.push(path);
-            }
+        let drawn = place.path().join(variant).join(format!("{figure}.svg"));
+        let drawn = std::fs::read_to_string(drawn).unwrap();
+        let committed = std::fs::read_to_string(&file).unwrap_or_default();
+        if alike(&committed, &drawn) {
+            continue;
+        }
+        if bless() {
+            std::fs::write(file, drawn).unwrap();
+        } else {
+            differing.push(file);
         }
     }
     assert!(

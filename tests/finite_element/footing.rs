@@ -54,6 +54,12 @@ pub(crate) fn text(footing: Footing) -> String {
     format!(
         r#"
 analysis = "plane_strain"
+supports = [
+  {{ line = "axis", fixed = ["x"] }},
+  {{ line = "right", fixed = ["x"] }},
+  {{ line = "bottom", fixed = ["x", "y"] }},
+  {{ line = "strip", fixed = ["x"] }},
+]
 [mesh]
 origin = [0.0, {:?}]
 columns = [
@@ -61,8 +67,7 @@ columns = [
   {{ n = {}, to = {width:?}, ratio = {} }},
 ]
 rows = [{{ n = {}, to = 0.0, ratio = {} }}]
-[[mesh.region]]
-group = "ground"
+region = [{{ group = "ground" }}]
 [mesh.lines]
 axis = {{ x = 0.0 }}
 right = {{ x = {width:?} }}
@@ -78,18 +83,6 @@ friction_angle = {friction_angle:?}
 dilatancy_angle = {dilatancy_angle:?}
 [groups]
 ground = {{ formulation = "solid", integration = "{integration}", law = "ground" }}
-[[supports]]
-line = "axis"
-fixed = ["x"]
-[[supports]]
-line = "right"
-fixed = ["x"]
-[[supports]]
-line = "bottom"
-fixed = ["x", "y"]
-[[supports]]
-line = "strip"
-fixed = ["x"]
 [[phase]]
 name = "push"
 increments = {increments}

@@ -94,6 +94,11 @@ fn k_l(core: (f64, f64), b: f64, n: usize, interface: Interface) -> f64 {
     let text = format!(
         r#"
 analysis = "axisymmetric"
+supports = [
+  {{ line = "top", fixed = ["z"] }},
+  {{ line = "bottom", fixed = ["z"] }},
+  {{ line = "axis", fixed = ["r"] }},
+]
 [mesh]
 columns = [{{ n = 1, to = {A} }}, {{ n = {across}, to = {} }}, {{ n = {n}, to = {b}, ratio = {ratio} }}]
 rows = [{{ n = 1, to = {HEIGHT} }}]
@@ -115,15 +120,6 @@ bottom = {{ z = 0.0 }}
 core = {{ formulation = "solid", integration = "full", law = "core" }}
 ground = {{ formulation = "solid", integration = "full", law = "ground" }}
 {group}
-[[supports]]
-line = "top"
-fixed = ["z"]
-[[supports]]
-line = "bottom"
-fixed = ["z"]
-[[supports]]
-line = "axis"
-fixed = ["r"]
 [[phase]]
 name = "confinement"
 increments = 1

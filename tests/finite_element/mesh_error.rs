@@ -249,6 +249,11 @@ fn a_jump_between_groups_is_no_error() {
     let text = format!(
         r#"
 analysis = "plane_strain"
+supports = [
+  {{ line = "bottom", fixed = ["y"] }},
+  {{ line = "left", fixed = ["x"] }},
+  {{ line = "right", fixed = ["x"] }},
+]
 mesh.columns = [{{ n = 3, to = 1.0 }}]
 mesh.rows = [{{ n = 3, to = 1.0 }}, {{ n = 3, to = 2.0 }}]
 mesh.region = [{{ group = "soft" }}, {{ group = "stiff", y = [1.0, 2.0] }}]
@@ -258,15 +263,6 @@ mesh.lines = {{ bottom = {{ y = 0.0 }}, top = {{ y = 2.0 }}, left = {{ x = 0.0 }
 [groups]
 soft = {{ formulation = "solid", law = "soft" }}
 stiff = {{ formulation = "solid", law = "stiff" }}
-[[supports]]
-line = "bottom"
-fixed = ["y"]
-[[supports]]
-line = "left"
-fixed = ["x"]
-[[supports]]
-line = "right"
-fixed = ["x"]
 [[phase]]
 name = "press"
 increments = 1
@@ -292,6 +288,7 @@ mesh_error = true
 fn no_estimate_is_not_taken_for_no_error() {
     let text = r#"
 analysis = "plane_strain"
+supports = [{ line = "bottom", fixed = ["x", "y"] }]
 [mesh]
 columns = [{ n = 3, to = 1.0 }]
 rows = [{ n = 2, to = 1.0 }, { n = 2, to = 2.0 }]
@@ -307,9 +304,6 @@ joint = { law = "coulomb_joint", parameters = { normal_stiffness = 1e6, shear_st
 lower = { formulation = "solid", law = "soil" }
 upper = { formulation = "solid", law = "soil" }
 seam = { formulation = "zero_thickness", line = "seam", law = "joint" }
-[[supports]]
-line = "bottom"
-fixed = ["x", "y"]
 [[phase]]
 name = "press"
 increments = 1

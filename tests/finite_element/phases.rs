@@ -31,11 +31,15 @@ fn square(laws: &str, group: &str, phases: &str) -> Finished {
     run(&format!(
         r#"
 analysis = "plane_strain"
+supports = [
+  {{ line = "bottom", fixed = ["y"] }},
+  {{ line = "left", fixed = ["x"] }},
+  {{ line = "right", fixed = ["x"] }},
+]
 [mesh]
 columns = [{{ n = 2, to = 1.0 }}]
 rows = [{{ n = 2, to = 1.0 }}]
-[[mesh.region]]
-group = "ground"
+region = [{{ group = "ground" }}]
 [mesh.lines]
 left = {{ x = 0.0 }}
 right = {{ x = 1.0 }}
@@ -47,15 +51,6 @@ top = {{ y = 1.0 }}
 formulation = "solid"
 integration = "full"
 {group}
-[[supports]]
-line = "bottom"
-fixed = ["y"]
-[[supports]]
-line = "left"
-fixed = ["x"]
-[[supports]]
-line = "right"
-fixed = ["x"]
 {phases}
 [probes]
 top = {{ line = "top", quantity = "displacement_y" }}
@@ -278,19 +273,19 @@ fn reactions_balance_loads_over_the_whole_turn() {
         let text = format!(
             r#"
 analysis = "axisymmetric"
+supports = [
+  {{ line = "axis", fixed = ["r"] }},
+  {{ line = "wall", fixed = ["r"] }},
+  {{ line = "bottom", fixed = ["r", "z"] }},
+]
 [mesh]
 columns = [{{ n = 1, to = 0.3 }}, {{ n = 1, to = 0.32 }}, {{ n = 3, to = 2.0, ratio = 1.5 }}]
 rows = [{{ n = 2, to = 0.5 }}, {{ n = 3, to = 1.5 }}]
-[[mesh.region]]
-group = "ground"
-[[mesh.region]]
-group = "layer"
-r = [0.3, 0.32]
-z = [0.5, 1.5]
-[[mesh.region]]
-group = "pile"
-r = [0.0, 0.3]
-z = [0.5, 1.5]
+region = [
+  {{ group = "ground" }},
+  {{ group = "layer", r = [0.3, 0.32], z = [0.5, 1.5] }},
+  {{ group = "pile", r = [0.0, 0.3], z = [0.5, 1.5] }},
+]
 [mesh.lines]
 axis = {{ r = 0.0 }}
 wall = {{ r = 2.0 }}
@@ -307,15 +302,6 @@ parameters = {{ normal_stiffness = 1e6, shear_stiffness = 3e5, cohesion = 4.0, f
 ground = {{ formulation = "solid", integration = "full", law = "ground" }}
 pile = {{ formulation = "solid", integration = "full", law = "pile" }}
 layer = {{ formulation = "thin_layer", integration = "{integration}", law = "layer" }}
-[[supports]]
-line = "axis"
-fixed = ["r"]
-[[supports]]
-line = "wall"
-fixed = ["r"]
-[[supports]]
-line = "bottom"
-fixed = ["r", "z"]
 [[phase]]
 name = "load"
 increments = 2

@@ -19,6 +19,11 @@ fn pile(increments: usize, unit: f64, tolerance: f64) -> String {
         r#"
 title = "pile in sand"
 analysis = "axisymmetric"
+supports = [
+  {{ line = "axis", fixed = ["r"] }},
+  {{ line = "far", fixed = ["r"] }},
+  {{ line = "bottom", fixed = ["r", "z"] }},
+]
 [mesh]
 origin = [0.0, -20.0]
 columns = [{{ n = 2, to = 0.5 }}, {{ n = 4, to = 1.5, ratio = 1.4 }}, {{ n = 7, to = 15.0, ratio = 1.5 }}]
@@ -39,15 +44,6 @@ sand = {{ formulation = "solid", law = "sand", unit_weight = {weight}, initial_s
 pile = {{ formulation = "solid", law = "sand", unit_weight = {weight}, initial_stress = {{ k_0 = 0.5 }} }}
 shaft = {{ formulation = "zero_thickness", line = "shaft", law = "skin", active = false }}
 base = {{ formulation = "zero_thickness", line = "base", law = "skin", active = false }}
-[[supports]]
-line = "axis"
-fixed = ["r"]
-[[supports]]
-line = "far"
-fixed = ["r"]
-[[supports]]
-line = "bottom"
-fixed = ["r", "z"]
 [[phase]]
 name = "ground"
 increments = 1
@@ -108,6 +104,7 @@ fn what_a_shaft_cannot_carry_is_no_equilibrium() {
         r#"
 title = "slice"
 analysis = "axisymmetric"
+supports = [{{ line = "axis", fixed = ["r"] }}, {{ line = "far", fixed = ["r", "z"] }}]
 [mesh]
 columns = [{{ n = 1, to = 0.25 }}, {{ n = 4, to = 2.0, ratio = 1.6 }}]
 rows = [{{ n = 4, to = 1.0 }}]
@@ -124,12 +121,6 @@ skin = {{ law = "coulomb_joint", parameters = {{ normal_stiffness = 1e6, shear_s
 soil = {{ formulation = "solid", law = "soil", initial_stress = {{ stress_11 = -100.0, stress_22 = -100.0, stress_33 = -100.0 }} }}
 pile = {{ formulation = "solid", law = "concrete" }}
 shaft = {{ formulation = "zero_thickness", line = "shaft", law = "skin" }}
-[[supports]]
-line = "axis"
-fixed = ["r"]
-[[supports]]
-line = "far"
-fixed = ["r", "z"]
 [[phase]]
 name = "push"
 increments = 10

@@ -193,6 +193,7 @@ fn punch(view: View, control: &str) -> String {
         r#"
 title = "punch"
 analysis = "plane_strain"
+supports = [{{ line = "bottom", fixed = ["x", "y"] }}, {{ line = "held", fixed = ["{a}"] }}]
 [mesh]
 origin = {origins}
 columns = {columns}
@@ -213,12 +214,6 @@ skin = {{ law = "coulomb_joint", parameters = {{ normal_stiffness = {skin:e}, sh
 ground = {{ formulation = "solid", law = "sand", integration = "reduced" }}
 punch = {{ formulation = "solid", law = "steel" }}
 skin = {{ formulation = "zero_thickness", line = "mid", law = "skin", integration = "nodes" }}
-[[supports]]
-line = "bottom"
-fixed = ["x", "y"]
-[[supports]]
-line = "held"
-fixed = ["{a}"]
 [solver]
 control = "{control}"
 [[phase]]

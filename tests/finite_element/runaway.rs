@@ -44,16 +44,16 @@ fn pile(solver: &str) -> String {
     format!(
         r#"
 analysis = "axisymmetric"
+supports = [
+  {{ line = "bottom", fixed = ["x", "y"] }},
+  {{ line = "left", fixed = ["x"] }},
+  {{ line = "right", fixed = ["x"] }},
+]
 [mesh]
 origin = [1.0, 0.0]
 columns = [{{ n = 2, to = 1.04 }}, {{ n = 1, to = 1.041 }}, {{ n = 2, to = 1.1 }}]
 rows = [{{ n = 4, to = 0.05 }}, {{ n = 1, to = 0.051 }}, {{ n = 4, to = 0.1 }}]
-[[mesh.region]]
-group = "ground"
-[[mesh.region]]
-group = "pile"
-x = [1.0, 1.04]
-y = [0.05, 0.1]
+region = [{{ group = "ground" }}, {{ group = "pile", x = [1.0, 1.04], y = [0.05, 0.1] }}]
 [mesh.lines]
 left = {{ x = 1.0 }}
 right = {{ x = 1.1 }}
@@ -67,15 +67,6 @@ parameters = {{ young_modulus = 34e3, poisson_ratio = 0.3, cohesion = 1.0, frict
 [groups]
 ground = {{ formulation = "solid", law = "ground", integration = "reduced" }}
 pile = {{ formulation = "solid", integration = "full", law = "steel" }}
-[[supports]]
-line = "bottom"
-fixed = ["x", "y"]
-[[supports]]
-line = "left"
-fixed = ["x"]
-[[supports]]
-line = "right"
-fixed = ["x"]
 [[phase]]
 name = "push"
 increments = 1
@@ -108,16 +99,12 @@ fn block(solver: &str) -> String {
     format!(
         r#"
 analysis = "plane_strain"
+supports = [{{ line = "bottom", fixed = ["x", "y"] }}, {{ line = "left", fixed = ["x"] }}]
 [mesh]
 origin = [-1.0, -2.0]
 columns = [{{ n = 1, to = -0.96 }}, {{ n = 1, to = -0.9 }}]
 rows = [{{ n = 4, to = -1.5 }}, {{ n = 4, to = -1.0 }}]
-[[mesh.region]]
-group = "ground"
-[[mesh.region]]
-group = "block"
-x = [-1.0, -0.96]
-y = [-1.5, -1.0]
+region = [{{ group = "ground" }}, {{ group = "block", x = [-1.0, -0.96], y = [-1.5, -1.0] }}]
 [mesh.lines]
 left = {{ x = -1.0 }}
 bottom = {{ y = -2.0 }}
@@ -130,12 +117,6 @@ parameters = {{ young_modulus = 34e3, poisson_ratio = 0.3, cohesion = 1.0, frict
 [groups]
 ground = {{ formulation = "solid", law = "ground", integration = "reduced" }}
 block = {{ formulation = "solid", integration = "full", law = "steel" }}
-[[supports]]
-line = "bottom"
-fixed = ["x", "y"]
-[[supports]]
-line = "left"
-fixed = ["x"]
 [[phase]]
 name = "push"
 increments = 3
@@ -253,18 +234,20 @@ fn both_criteria_are_given_and_the_failed_one_first() {
 /// A pile in an elastic ground whose layer slides; with the matrix of a step's start corrections grow tenfold.
 const GROWS: &str = r#"
 analysis = "axisymmetric"
+supports = [
+  { line = "bottom", fixed = ["x", "y"] },
+  { line = "far", fixed = ["x"] },
+  { line = "axis", fixed = ["x"] },
+]
 [mesh]
 origin = [0.0, -6.0]
 columns = [{ n = 1, to = 0.5 }, { n = 1, to = 0.52 }, { n = 5, to = 5.0, ratio = 1.3 }]
 rows = [{ n = 2, to = -2.0 }, { n = 4, to = 0.0 }]
-[[mesh.region]]
-group = "ground"
-[[mesh.region]]
-group = "pile"
-x = [0.0, 0.5]
-[[mesh.region]]
-group = "shaft"
-x = [0.5, 0.52]
+region = [
+  { group = "ground" },
+  { group = "pile", x = [0.0, 0.5] },
+  { group = "shaft", x = [0.5, 0.52] },
+]
 [mesh.lines]
 axis = { x = 0.0 }
 far = { x = 5.0 }
@@ -286,15 +269,6 @@ normal = "x"
 integration = "reduced"
 unit_weight = 18.0
 initial_stress = { stress_11 = [[-6.0, -64.8], [0.0, 0.0]], stress_22 = [[-6.0, -108.0], [0.0, 0.0]], stress_33 = [[-6.0, -64.8], [0.0, 0.0]] }
-[[supports]]
-line = "bottom"
-fixed = ["x", "y"]
-[[supports]]
-line = "far"
-fixed = ["x"]
-[[supports]]
-line = "axis"
-fixed = ["x"]
 [[phase]]
 name = "in place"
 increments = 1

@@ -294,6 +294,7 @@ fn reactions_beside_an_interface_that_is_not_there_are_those_without_it() {
         format!(
             r#"
 analysis = "plane_strain"
+supports = [{{ line = "bottom", fixed = ["x", "y"] }}]
 [mesh]
 origin = [{first:?}, 0.0]
 columns = [{{ n = 4, to = {:?} }}]
@@ -314,9 +315,6 @@ wall = {{ law = "coulomb_joint", parameters = {{ normal_stiffness = 1e6, shear_s
 near = {{ formulation = "solid", law = "soil" }}
 far = {{ formulation = "solid", law = "soil" }}
 {joint}
-[[supports]]
-line = "bottom"
-fixed = ["x", "y"]
 [[phase]]
 name = "push"
 increments = 2

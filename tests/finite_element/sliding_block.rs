@@ -75,6 +75,11 @@ pub(crate) fn text(kind: Kind, laws: &str, phases: &str) -> String {
     format!(
         r#"
 analysis = "plane_strain"
+supports = [
+  {{ line = "base", fixed = ["x", "y"] }},
+  {{ line = "base_left", fixed = ["x", "y"] }},
+  {{ line = "base_right", fixed = ["x", "y"] }},
+]
 [mesh]
 origin = [0.0, -0.1]
 columns = [{{ n = 1, to = 1.0 }}]
@@ -108,15 +113,6 @@ law = "column"
 [groups.interface]
 formulation = "{group}"
 law = "interface"
-[[supports]]
-line = "base"
-fixed = ["x", "y"]
-[[supports]]
-line = "base_left"
-fixed = ["x", "y"]
-[[supports]]
-line = "base_right"
-fixed = ["x", "y"]
 {phases}
 [probes]
 sigma = {{ group = "interface", quantity = "traction_n", scale = -1.0 }}

@@ -46,24 +46,17 @@ fn text(solver: &str, pull: &str) -> String {
     format!(
         r#"
 analysis = "plane_strain"
+supports = [{{ line = "base", fixed = ["x", "y"] }}]
 [mesh]
 origin = [0.0, -0.1]
 columns = [{{ n = 1, to = 1.0 }}, {{ n = 1, to = 2.0 }}]
 rows = [{{ n = 1, to = 0.0 }}, {{ n = 1, to = 1e-4 }}, {{ n = 1, to = {top:?} }}]
-[[mesh.region]]
-group = "rigid"
-[[mesh.region]]
-group = "interface"
-x = [0.0, 1.0]
-y = [0.0, 1e-4]
-[[mesh.region]]
-group = "nothing"
-x = [1.0, 2.0]
-y = [0.0, 1e-4]
-[[mesh.region]]
-group = "rope"
-x = [1.0, 2.0]
-y = [1e-4, {top:?}]
+region = [
+  {{ group = "rigid" }},
+  {{ group = "interface", x = [0.0, 1.0], y = [0.0, 1e-4] }},
+  {{ group = "nothing", x = [1.0, 2.0], y = [0.0, 1e-4] }},
+  {{ group = "rope", x = [1.0, 2.0], y = [1e-4, {top:?}] }},
+]
 [mesh.lines]
 base = {{ y = -0.1 }}
 top = {{ y = {top:?}, x = [0.0, 1.0] }}
@@ -94,9 +87,6 @@ rigid = {{ formulation = "solid", integration = "full", law = "rigid" }}
 rope = {{ formulation = "solid", integration = "full", law = "rope" }}
 nothing = {{ formulation = "solid", integration = "full", law = "nothing" }}
 interface = {{ formulation = "thin_layer", integration = "mean", law = "interface" }}
-[[supports]]
-line = "base"
-fixed = ["x", "y"]
 [[phase]]
 name = "press"
 increments = 1
@@ -282,6 +272,11 @@ fn the_arc_length_takes_over_at_the_last_halving() {
 fn a_path_that_runs_backwards_is_recognised() {
     let text = r#"
 analysis = "axisymmetric"
+supports = [
+  { line = "axis", fixed = ["x"] },
+  { line = "bottom", fixed = ["x", "y"] },
+  { line = "far", fixed = ["x"] },
+]
 water = { level = -0.2186 }
 [mesh]
 origin = [0.0, -4.31501]
@@ -321,15 +316,6 @@ u_tp = 0.0014
 soil = { formulation = "solid", law = "soil", initial_stress = { 11 = -1.0, 22 = -1.0, 33 = -1.0 } }
 pile = { formulation = "solid", law = "steel", initial_stress = { 11 = -1.0, 22 = -1.0, 33 = -1.0 } }
 shaft = { formulation = "zero_thickness", line = "shaft", law = "joint" }
-[[supports]]
-line = "axis"
-fixed = ["x"]
-[[supports]]
-line = "bottom"
-fixed = ["x", "y"]
-[[supports]]
-line = "far"
-fixed = ["x"]
 [[phase]]
 name = "p1"
 increments = 1

@@ -59,11 +59,15 @@ fn text(group: &str, phases: &str) -> String {
     format!(
         r#"
 analysis = "plane_strain"
+supports = [
+  {{ line = "bottom", fixed = ["y"] }},
+  {{ line = "left", fixed = ["x"] }},
+  {{ line = "right", fixed = ["x"] }},
+]
 [mesh]
 columns = [{{ n = 1, to = 1.0 }}]
 rows = [{{ n = 1, to = 1.0 }}]
-[[mesh.region]]
-group = "ground"
+region = [{{ group = "ground" }}]
 [mesh.lines]
 left = {{ x = 0.0 }}
 right = {{ x = 1.0 }}
@@ -75,15 +79,6 @@ top = {{ y = 1.0 }}
 formulation = "solid"
 integration = "full"
 {group}
-[[supports]]
-line = "bottom"
-fixed = ["y"]
-[[supports]]
-line = "left"
-fixed = ["x"]
-[[supports]]
-line = "right"
-fixed = ["x"]
 {phases}
 [probes]
 top = {{ line = "top", quantity = "displacement_y" }}
@@ -171,6 +166,11 @@ fn strip(increments: usize, in_two: bool) -> f64 {
     let text = format!(
         r#"
 analysis = "plane_strain"
+supports = [
+  {{ line = "left", fixed = ["x"] }},
+  {{ line = "right", fixed = ["x"] }},
+  {{ line = "bottom", fixed = ["x", "y"] }},
+]
 [mesh]
 columns = [{{ n = 4, to = 1.0 }}, {{ n = 6, to = 5.0, ratio = 1.3 }}]
 rows = [{{ n = 8, to = 4.0, ratio = 0.85 }}]
@@ -183,15 +183,6 @@ formulation = "solid"
 law = "stiff"
 unit_weight = 18.0
 initial_stress = {{ k_0 = 0.6 }}
-[[supports]]
-line = "left"
-fixed = ["x"]
-[[supports]]
-line = "right"
-fixed = ["x"]
-[[supports]]
-line = "bottom"
-fixed = ["x", "y"]
 [[phase]]
 name = "load"
 increments = 2
@@ -368,6 +359,7 @@ fn a_swap_says_nothing_of_stresses_that_are_round_off() {
     let text = format!(
         r#"
 analysis = "plane_strain"
+supports = [{{ line = "bottom", fixed = ["y"] }}, {{ line = "left", fixed = ["x"] }}]
 [mesh]
 columns = [{{ n = 2, to = 1.0 }}, {{ n = 2, to = 2.0 }}]
 rows = [{{ n = 3, to = 1.0 }}]
@@ -384,12 +376,6 @@ second = {}
 [groups]
 soil = {{ formulation = "solid", law = "soil" }}
 joint = {{ formulation = "zero_thickness", line = "seam", law = "first" }}
-[[supports]]
-line = "bottom"
-fixed = ["y"]
-[[supports]]
-line = "left"
-fixed = ["x"]
 [[phase]]
 name = "press"
 increments = 3

@@ -30,12 +30,12 @@ pub(crate) fn text(law: &str, n: usize, integration: &str, phase: &str, probes: 
     format!(
         r#"
 analysis = "axisymmetric"
+supports = [{{ line = "top", fixed = ["z"] }}, {{ line = "bottom", fixed = ["z"] }}]
 [mesh]
 origin = [{A:?}, 0.0]
 columns = [{{ n = {n}, to = {B:?} }}]
 rows = [{{ n = 1, to = {HEIGHT} }}]
-[[mesh.region]]
-group = "ground"
+region = [{{ group = "ground" }}]
 [mesh.lines]
 inner = {{ r = {A:?} }}
 outer = {{ r = {B:?} }}
@@ -45,12 +45,6 @@ bottom = {{ z = 0.0 }}
 {law}
 [groups]
 ground = {{ formulation = "solid", integration = "{integration}", law = "ground" }}
-[[supports]]
-line = "top"
-fixed = ["z"]
-[[supports]]
-line = "bottom"
-fixed = ["z"]
 [[phase]]
 name = "load"
 {phase}

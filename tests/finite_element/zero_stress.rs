@@ -24,20 +24,16 @@ fn body(mirrored: bool) -> String {
     format!(
         r#"
 analysis = "plane_strain"
+supports = [{{ line = "bottom", fixed = ["y"] }}, {{ line = "left", fixed = ["x"] }}]
 [mesh]
 origin = [5.0, {origin:?}]
 columns = [{{ n = 2, to = 5.4 }}, {{ n = 1, to = 5.4001 }}, {{ n = 2, to = 6.0, ratio = 1.0 }}]
 rows = {rows}
-[[mesh.region]]
-group = "a"
-[[mesh.region]]
-group = "b"
-x = [5.0, 5.4]
-y = {b:?}
-[[mesh.region]]
-group = "i"
-x = [5.0, 5.4]
-y = {i:?}
+region = [
+  {{ group = "a" }},
+  {{ group = "b", x = [5.0, 5.4], y = {b:?} }},
+  {{ group = "i", x = [5.0, 5.4], y = {i:?} }},
+]
 [mesh.lines]
 left = {{ x = 5.0 }}
 bottom = {{ y = 0.0 }}
@@ -49,12 +45,6 @@ mepi = {{ law = "mepi", parameters = {{ k_n = 86e3, k_t = 37e3, n = 0.55, mu_0 =
 a = {{ formulation = "solid", law = "sand", integration = "reduced" }}
 b = {{ formulation = "solid", integration = "full", law = "sand" }}
 i = {{ formulation = "thin_layer", law = "mepi", integration = "reduced", normal = "y" }}
-[[supports]]
-line = "bottom"
-fixed = ["y"]
-[[supports]]
-line = "left"
-fixed = ["x"]
 [[phase]]
 name = "push"
 increments = 3
@@ -92,6 +82,12 @@ fn both_ways_up_no_force_is_left() {
 /// moves. All motion is round-off.
 const NOTHING: &str = r#"
 analysis = "axisymmetric"
+supports = [
+  { line = "axis", fixed = ["r"] },
+  { line = "wall", fixed = ["r"] },
+  { line = "ends", fixed = ["z"] },
+  { line = "top", fixed = ["z"] },
+]
 [mesh]
 columns = [{ n = 2, to = 0.25 }, { n = 4, to = 4.0 }]
 rows = [{ n = 2, to = 1.0 }]
@@ -111,18 +107,6 @@ joint = { law = "coulomb_joint", parameters = { normal_stiffness = 1e6, shear_st
 sand = { formulation = "solid", law = "sand", initial_stress = { 11 = -100.0, 22 = -100.0, 33 = -100.0 } }
 pile = { formulation = "solid", law = "concrete", initial_stress = { 11 = -100.0, 22 = -100.0, 33 = -100.0 } }
 joint = { formulation = "zero_thickness", line = "shaft", law = "joint" }
-[[supports]]
-line = "axis"
-fixed = ["r"]
-[[supports]]
-line = "wall"
-fixed = ["r"]
-[[supports]]
-line = "ends"
-fixed = ["z"]
-[[supports]]
-line = "top"
-fixed = ["z"]
 [[phase]]
 name = "nothing"
 increments = 3

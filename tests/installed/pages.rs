@@ -4,7 +4,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use tests::needs::compiler;
-use tests::place::{Outcome, Place};
+use tests::outcome::Outcome;
+use tests::place::Place;
 
 /// A command that takes longer than this is stopped as by Ctrl-C: it has read its files and opened its laws by then.
 const LONG_ENOUGH: f64 = 1.0;

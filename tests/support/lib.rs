@@ -4,5 +4,6 @@ pub mod case;
 pub mod figure;
 pub mod links;
 pub mod needs;
+pub mod outcome;
 pub mod place;
 pub mod tolerance;

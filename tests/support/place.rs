@@ -7,6 +7,7 @@
 )]
 
 use crate::needs::compiler;
+use crate::outcome::Outcome;
 use dist::{Built, Metadata};
 use std::collections::BTreeSet;
 use std::env::{self, consts::EXE_SUFFIX};
@@ -28,17 +29,6 @@ pub fn are_there(compilers: Compilers) -> bool {
     found.into_iter().all(|found| found.is_some())
 }
 
-/// What became of a command.
-#[derive(Debug)]
-pub struct Outcome {
-    /// Exit code.
-    pub code: Option<i32>,
-    /// What it prints.
-    pub stdout: String,
-    /// What it says.
-    pub stderr: String,
-}
-
 /// The archive, unpacked.
 #[derive(Debug)]
 pub struct Place {
@@ -53,8 +43,13 @@ pub fn repository() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
+/// A file or folder of the cases.
+pub fn case(name: impl AsRef<Path>) -> PathBuf {
+    repository().join("cases").join(name)
+}
+
 /// Where cargo puts the laws' libraries.
-fn deps() -> PathBuf {
+pub fn deps() -> PathBuf {
     env::current_exe().unwrap().parent().unwrap().to_owned()
 }
 
@@ -169,25 +164,12 @@ impl Place {
             // Help is broken at this width.
             .env("COLUMNS", "100")
             .envs(more.iter().copied());
-        let output = command.output().unwrap();
-        Outcome {
-            code: output.status.code(),
-            stdout: String::from_utf8(output.stdout).unwrap(),
-            stderr: String::from_utf8(output.stderr).unwrap(),
-        }
+        Outcome::of(&mut command)
     }
 
     /// Runs a line that has to succeed. What it prints.
     #[track_caller]
     pub fn done(&self, folder: &str, line: &str) -> String {
-        let outcome = self.shell(folder, line);
-        assert_eq!(
-            outcome.code,
-            Some(0),
-            "{line}\n{}{}",
-            outcome.stdout,
-            outcome.stderr
-        );
-        outcome.stdout
+        self.shell(folder, line).ended(0).stdout
     }
 }

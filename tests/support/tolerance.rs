@@ -6,3 +6,15 @@ pub const ROUND_OFF: f64 = 1e-12;
 pub const EQUILIBRIUM: f64 = 1e-8;
 /// What the point driver's tolerance of 1e-10 leaves, relative to the stress or strain in play.
 pub const DRIVER: f64 = 1e-9;
+
+/// Asserts |found − expected| ≤ tolerance.
+///
+/// # Panics
+/// With both numbers, otherwise.
+#[track_caller]
+pub fn near(found: f64, expected: f64, tolerance: f64) {
+    assert!(
+        (found - expected).abs() <= tolerance,
+        "{found:e}, expected {expected:e} within {tolerance:e}"
+    );
+}

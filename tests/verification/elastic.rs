@@ -2,7 +2,7 @@
 
 use crate::setup::{Elastic, number, run};
 use std::f64::consts::PI;
-use tests::tolerance::{EQUILIBRIUM, ROUND_OFF};
+use tests::tolerance::{EQUILIBRIUM, ROUND_OFF, near};
 
 #[test]
 fn thick_cylinder() {
@@ -27,13 +27,7 @@ fn thick_cylinder() {
         };
         let u = |r: f64| c * (1.0 + nu) / ground.young * ((1.0 - 2.0 * nu) * r + b * b / r);
         for (wall, r) in [("inner", a), ("outer", b)] {
-            results.near(
-                &format!("{of}, {variant}, {wall}"),
-                results.last(variant, wall),
-                u(r),
-                u(r),
-                bounds[0],
-            );
+            results.ends_at(variant, wall, u(r), bounds[0]);
         }
         let rows = results.rows(variant, "points.csv");
         let errors = rows.iter().map(|row| {
@@ -93,13 +87,7 @@ fn circular_plate() {
         ("n16", 2e-3),
         ("n8_full", 1.2e-2),
     ] {
-        results.near(
-            variant,
-            results.last(variant, "deflection"),
-            exact,
-            exact,
-            bound,
-        );
+        results.ends_at(variant, "deflection", exact, bound);
     }
 }
 
@@ -133,20 +121,8 @@ fn rigid_disc() {
     let force = 4.0 * ground.shear() * radius * w / (1.0 - nu);
     let settlement =
         force / (4.0 * ground.shear() * radius) * (1.0 - 2.0 * nu) / (3.0 - 4.0 * nu).ln();
-    results.near(
-        "bonded, force",
-        results.last("bonded", "force"),
-        force,
-        force,
-        EQUILIBRIUM,
-    );
-    results.near(
-        "bonded",
-        results.last("bonded", "w"),
-        settlement,
-        settlement,
-        0.01,
-    );
+    results.ends_at("bonded", "force", force, EQUILIBRIUM);
+    results.ends_at("bonded", "w", settlement, 0.01);
 }
 
 #[test]
@@ -157,20 +133,8 @@ fn flexible_disc() {
     let edge = centre * 2.0 / PI;
     for (variant, bound, of_stress) in [("coarse", 0.02, 0.15), ("fine", 0.007, 0.01)] {
         // The ground ends at 200 radii: both settle less by about q π a² (1 − ν²)/(π E 200 a), 0.25 % of the centre's.
-        results.near(
-            &format!("{variant}, centre"),
-            results.last(variant, "centre"),
-            centre,
-            centre,
-            bound,
-        );
-        results.near(
-            &format!("{variant}, edge"),
-            results.last(variant, "edge"),
-            edge,
-            edge,
-            bound,
-        );
+        results.ends_at(variant, "centre", centre, bound);
+        results.ends_at(variant, "edge", edge, bound);
         let difference = results.last(variant, "centre") - results.last(variant, "edge");
         results.near(
             &format!("{variant}, difference"),
@@ -212,11 +176,7 @@ fn pile_in_half_space() {
     };
     // Figures quoted from the paper by others.
     for (slender, nu, quoted) in [(14.6, 0.5, 36.84), (14.6, 0.3, 32.04), (40.0, 0.3, 50.48)] {
-        assert!(
-            (stiffness(slender, nu) - quoted).abs() < 0.02,
-            "{}",
-            stiffness(slender, nu)
-        );
+        near(stiffness(slender, nu), quoted, 0.02);
     }
     // The formula is an approximation, within 10 % of elements by its authors.
     for (variant, slender, nu) in [
@@ -262,20 +222,8 @@ fn gibson_strip() {
     let exact = 100.0 / (2.0 * 1000.0);
     // The ground ends at 40 half-widths and is not quite incompressible; a modulus for each element.
     for (variant, bound) in [("coarse", 0.13), ("fine", 0.07), ("finer", 0.05)] {
-        results.near(
-            &format!("{variant}, centre"),
-            results.last(variant, "centre"),
-            exact,
-            exact,
-            bound,
-        );
-        results.near(
-            &format!("{variant}, mean"),
-            results.last(variant, "mean"),
-            exact,
-            exact,
-            bound,
-        );
+        results.ends_at(variant, "centre", exact, bound);
+        results.ends_at(variant, "mean", exact, bound);
     }
 }
 

@@ -121,13 +121,7 @@ fn oblique_interface() {
         // Sliding: (p − q)/2 = c + (p + q)/2 tan φ, whatever the dilatancy.
         let (c, tan) = (5.0, 20.0_f64.to_radians().tan());
         let limit = (2.0 * c + q * (1.0 + tan)) / (1.0 - tan);
-        results.near(
-            &format!("{variant}, limit"),
-            results.last(variant, "force"),
-            limit,
-            limit,
-            EQUILIBRIUM,
-        );
+        results.ends_at(variant, "force", limit, EQUILIBRIUM);
     }
 }
 
@@ -298,20 +292,8 @@ fn curved_interface() {
         ("triangles_2", 0.08, 0.6),
         ("triangles_4", 0.02, 0.2),
     ] {
-        results.near(
-            &format!("{variant}, inner"),
-            results.last(variant, "inner"),
-            inner,
-            inner,
-            bound,
-        );
-        results.near(
-            &format!("{variant}, outer"),
-            results.last(variant, "outer"),
-            outer,
-            outer,
-            bound,
-        );
+        results.ends_at(variant, "inner", inner, bound);
+        results.ends_at(variant, "outer", outer, bound);
         for probe in ["sigma_min", "sigma_max"] {
             results.near(
                 &format!("{variant}, {probe}"),

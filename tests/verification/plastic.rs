@@ -44,13 +44,7 @@ fn cylinder_mohr_coulomb() {
             .fold(0.0, f64::max);
         // The front of yielding lies inside an element.
         results.within(&format!("{variant}, course"), worst, 0.0, 10.0 * bound);
-        results.near(
-            &format!("{variant}, limit"),
-            results.last(variant, "pressure"),
-            limit,
-            limit,
-            bound,
-        );
+        results.ends_at(variant, "pressure", limit, bound);
     }
 }
 

@@ -115,6 +115,13 @@ impl Results {
         self.within(what, (value - exact) / scale, -bound, bound);
     }
 
+    /// Asserts |value − exact| ≤ bound · exact of a probe at the end.
+    #[track_caller]
+    pub(crate) fn ends_at(&self, variant: &str, probe: &str, exact: f64, bound: f64) {
+        let value = self.last(variant, probe);
+        self.near(&format!("{variant}, {probe}"), value, exact, exact, bound);
+    }
+
     /// Asserts that the error lies between bounds, and says what it is.
     #[track_caller]
     pub(crate) fn within(&self, what: &str, error: f64, least: f64, most: f64) {

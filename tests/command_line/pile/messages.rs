@@ -1,7 +1,7 @@
 //! What is wrong or odd about a pile, and where it is written.
 
-use super::{BAR, PILE, rows, run, summary, value};
-use crate::program::{BAD_INPUT, DONE, Place};
+use super::{BAR, PILE, rows, run, value};
+use crate::program::{BAD_INPUT, DONE, Place, refuses_file};
 use serde_json::Value;
 use std::f64::consts::PI;
 
@@ -23,11 +23,7 @@ fn a_bond_that_begins_without_normal_stress_is_warned_of_where_it_opens() {
     for text in [&confined, &glued] {
         let place = Place::new();
         let outcome = place.run_case(text);
-        assert!(
-            !outcome.says("began without normal stress"),
-            "{}",
-            outcome.stderr
-        );
+        outcome.hides("began without normal stress");
         let rows = rows(&place.path("out/history.csv"));
         let head = -value(rows.last().unwrap(), "pile_head_load");
         assert!((head - expected).abs() < 1e-3 * expected, "{head}");
@@ -35,7 +31,7 @@ fn a_bond_that_begins_without_normal_stress_is_warned_of_where_it_opens() {
     for increments in ["increments = 2", "increments = 1"] {
         let place = Place::new();
         let outcome = place.run_case(bare.replace("increments = 2", increments));
-        assert!(outcome.says(says), "{}", outcome.stderr);
+        outcome.shows(says);
     }
     // A phase in which nothing happens leaves the bond as it was.
     let later = bare.replacen(
@@ -44,101 +40,64 @@ fn a_bond_that_begins_without_normal_stress_is_warned_of_where_it_opens() {
         1,
     );
     let outcome = Place::new().run_case(later);
-    assert!(outcome.says(says), "{}", outcome.stderr);
+    outcome.shows(says);
     // Joined by friction alone it would not have held either.
     let loose = bare.replace("cohesion = 500.0", "cohesion = 0.0");
     let place = Place::new();
     let outcome = place.run_case(loose);
-    assert!(
-        !outcome.says("began without normal stress"),
-        "{}",
-        outcome.stderr
-    );
+    outcome.hides("began without normal stress");
 }
 
 #[test]
 fn what_is_no_pile_is_told_where_it_is_written() {
-    for (edit, says) in [
-        (
-            ("group = [\"top\", \"foot\"]", "group = [\"top\", \"fot\"]"),
-            "[pile]: there is no group `fot`",
-        ),
-        (
-            ("group = [\"top\", \"foot\"]", "group = \"upper\""),
-            "`upper` is an interface",
-        ),
-        (
-            (
-                "shaft = [\"upper\", \"lower\"]",
-                "shaft = [\"upper\", \"lover\"]",
-            ),
-            "there is no group `lover`",
-        ),
-        (
-            (
-                "shaft = [\"upper\", \"lower\"]",
-                "shaft = [\"upper\", \"soil\"]",
-            ),
-            "`soil` is no interface",
-        ),
-        (
-            ("shaft = [\"upper\", \"lower\"]", "shaft = []"),
-            "`shaft` is an empty list",
-        ),
-        (
-            ("base = \"toe\"\n", "base = \"tow\"\n"),
-            "there is neither a group nor a line `tow`",
-        ),
-        (
-            ("base = \"toe\"\n", "base = \"soil\"\n"),
-            "`soil` is no interface",
-        ),
-        (
-            ("base = \"toe\"\n", "base = \"bottom\"\n"),
-            "`bottom` does not touch the pile's groups",
-        ),
-        (
-            ("base = \"toe\"\n", "base = \"inside\"\n"),
-            "`inside` lies inside the pile's groups",
-        ),
-        (
-            ("head = \"head\"\n", "head = \"haed\"\n"),
-            "there is no line `haed`",
-        ),
-        (
-            ("head = \"head\"\n", "head = \"far\"\n"),
-            "`far` has no edge of the pile's elements: name the line along the top of the pile",
-        ),
-        (
-            ("head = \"head\"\n", "head = \"head\"\ndiameter = -1.0\n"),
-            "diameter",
-        ),
-        (
-            (
-                "[pile]",
-                "[probes]\npile_head_load = { line = \"head\", quantity = \"displacement_z\" }\n[pile]",
-            ),
-            "is a column of history.csv already",
-        ),
-    ] {
-        let place = Place::new();
-        assert!(PILE.contains(edit.0), "{edit:?}");
-        let at = PILE.rfind("[pile]").unwrap();
-        let text = PILE[..at].to_owned() + &PILE[at..].replacen(edit.0, edit.1, 1);
-        place.write("pile.toml", text);
-        let outcome = place.run(&["run", "pile.toml", "--out", "out"]);
-        assert_eq!(
-            outcome.code,
-            Some(BAD_INPUT),
-            "{edit:?}: {}",
-            outcome.stderr
-        );
-        assert!(
-            outcome.says(says) && outcome.says("pile.toml:"),
-            "{says}: {}",
-            outcome.stderr
-        );
-    }
+    let run = ["run", "pile.toml", "--out", "out"];
+    refuses_file(
+        &Place::new(),
+        ("pile.toml", PILE),
+        &run,
+        BAD_INPUT,
+        r#"
+group = ["top", "foot"] => group = ["top", "fot"]
+  [pile]: there is no group `fot`
+  pile.toml:
+group = ["top", "foot"] => group = "upper"
+  `upper` is an interface
+  pile.toml:
+shaft = ["upper", "lower"] => shaft = ["upper", "lover"]
+  there is no group `lover`
+  pile.toml:
+shaft = ["upper", "lower"] => shaft = ["upper", "soil"]
+  `soil` is no interface
+  pile.toml:
+shaft = ["upper", "lower"] => shaft = []
+  `shaft` is an empty list
+  pile.toml:
+base = "toe"\n => base = "tow"\n
+  there is neither a group nor a line `tow`
+  pile.toml:
+base = "toe"\n => base = "soil"\n
+  `soil` is no interface
+  pile.toml:
+base = "toe"\n => base = "bottom"\n
+  `bottom` does not touch the pile's groups
+  pile.toml:
+base = "toe"\n => base = "inside"\n
+  `inside` lies inside the pile's groups
+  pile.toml:
+head = "head"\n => head = "haed"\n
+  there is no line `haed`
+  pile.toml:
+head = "head"\n => head = "far"\n
+  `far` has no edge of the pile's elements: name the line along the top of the pile
+  pile.toml:
+head = "head"\n => head = "head"\ndiameter = -1.0\n
+  diameter
+  pile.toml:
+[pile] => [probes]\npile_head_load = { line = "head", quantity = "displacement_z" }\n[pile]
+  is a column of history.csv already
+  pile.toml:
+"#,
+    );
 }
 
 #[test]
@@ -147,7 +106,7 @@ fn a_figure_along_the_pile_is_drawn_or_told_what_is_wrong() {
         format!("\n[[figure]]\nname = \"forces\"\nx = \"{x}\"\ny = [\"z\"]\n{along}\n")
     };
     let (place, _) = run(&(PILE.to_owned() + &figure("along_pile = {}", "axial_force")));
-    let drawn = std::fs::read_to_string(place.path("out/forces.svg")).unwrap();
+    let drawn = place.read("out/forces.svg");
     assert!(
         drawn.contains("pull, -"),
         "a curve for the end of a phase, by its load"
@@ -172,7 +131,7 @@ fn a_figure_along_the_pile_is_drawn_or_told_what_is_wrong() {
         place.write("pile.toml", text.to_owned() + &figure(along, x));
         let outcome = place.run(&["run", "pile.toml"]);
         assert_eq!(outcome.code, Some(BAD_INPUT), "{says}: {}", outcome.stderr);
-        assert!(outcome.says(says), "{says}: {}", outcome.stderr);
+        outcome.shows(says);
     }
 }
 
@@ -255,8 +214,7 @@ fn forces_out_of_balance_are_told_as_a_share_of_the_largest_load() {
     let told = |solver: &str| {
         let place = Place::new();
         place.write("pile.toml", format!("{PILE}[solver]\n{solver}"));
-        let outcome = place.run(&["run", "pile.toml", "--out", "out"]);
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        let outcome = place.done(&["run", "pile.toml", "--out", "out"]);
         let said = format!("{}{}", outcome.stdout, outcome.stderr);
         let line = said
             .lines()
@@ -268,7 +226,7 @@ fn forces_out_of_balance_are_told_as_a_share_of_the_largest_load() {
     let (place, coarse) =
         told("method = \"initial_stress\"\nforce_tolerance = 1e-2\ndisplacement_tolerance = 0.1\n");
     let residual = |phase: &Value| phase["residual_force"].as_f64().unwrap();
-    let summary = summary(&place);
+    let summary = place.summary();
     let phases = summary["phases"].as_array().unwrap();
     let left = phases.iter().map(residual).fold(0.0, f64::max);
     // 1 % of all forces, of which the weight of the ground is the largest part.
@@ -293,6 +251,6 @@ fn forces_out_of_balance_are_told_as_a_share_of_the_largest_load() {
     );
     let push = phases.iter().find(|phase| phase["name"] == "push");
     let said = format!("phase `push`</dt><dd>{:.2} kN", residual(push.unwrap()));
-    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    let report = place.read("out/report.html");
     assert!(report.contains(&said), "{said}");
 }

@@ -1,7 +1,7 @@
 //! Studies whose processes are killed, stopped or started twice.
 
-use super::{column, done, table};
-use crate::program::{BAD_INPUT, Place, edited};
+use super::{column, table};
+use crate::program::{DONE, Place, edited};
 use std::collections::BTreeMap;
 use std::os::unix::process::CommandExt;
 use std::process::Stdio;
@@ -85,7 +85,7 @@ fn family(pid: u32) -> Vec<u32> {
 fn kills_lose_nothing() {
     let undisturbed = slow();
     let started = Instant::now();
-    done(&undisturbed.run(&ARGUMENTS));
+    undisturbed.run(&ARGUMENTS).ended(DONE);
     let length = started.elapsed().as_secs_f64();
     let expected = table(&undisturbed);
     assert_eq!(column(&expected, "status"), ["done"; 12]);
@@ -129,7 +129,7 @@ fn kills_lose_nothing() {
         "only {on_the_way} kills hit the study on its way"
     );
     wait_for_locks(&place);
-    done(&place.run(&ARGUMENTS));
+    place.run(&ARGUMENTS).ended(DONE);
     assert_eq!(table(&place), expected);
 }
 
@@ -148,7 +148,7 @@ fn wait_for_locks(place: &Place) {
 #[test]
 fn ctrl_c_stops_a_study_and_the_same_command_goes_on() {
     let undisturbed = slow();
-    done(&undisturbed.run(&ARGUMENTS));
+    undisturbed.run(&ARGUMENTS).ended(DONE);
     let expected = table(&undisturbed);
 
     let place = slow();
@@ -161,7 +161,7 @@ fn ctrl_c_stops_a_study_and_the_same_command_goes_on() {
         .spawn()
         .unwrap();
     let since = Instant::now();
-    let text = || std::fs::read_to_string(place.path("said")).unwrap();
+    let text = || place.read("said");
     while !text().contains("run ") {
         assert!(since.elapsed() < Duration::from_mins(1), "{}", text());
         std::thread::sleep(Duration::from_millis(5));
@@ -178,7 +178,7 @@ fn ctrl_c_stops_a_study_and_the_same_command_goes_on() {
         "{states:?}"
     );
     assert!(states.get("done").copied().unwrap_or(0) < 12, "{states:?}");
-    done(&place.run(&ARGUMENTS));
+    place.run(&ARGUMENTS).ended(DONE);
     assert_eq!(table(&place), expected);
 }
 
@@ -191,13 +191,8 @@ fn two_processes_do_not_carry_out_one_study() {
         assert!(since.elapsed() < Duration::from_mins(1));
         std::thread::sleep(Duration::from_millis(5));
     }
-    let second = place.run(&ARGUMENTS);
-    assert_eq!(second.code, Some(BAD_INPUT));
-    assert!(
-        second.says("another process carries out this study"),
-        "{}",
-        second.stderr
-    );
+    let second = place.refused(&ARGUMENTS);
+    second.shows("another process carries out this study");
     assert!(first.wait().unwrap().success());
     assert_eq!(states(&place), BTreeMap::from([("done".to_owned(), 12)]));
 }

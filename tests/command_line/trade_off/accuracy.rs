@@ -1,43 +1,30 @@
 //! `accuracy` in a case file.
 
 use super::{COLUMN, HARDENING, Row, history, number, studied};
-use crate::program::{BAD_INPUT, DONE, NO_EQUILIBRIUM, Outcome, Place, edited, refuses};
+use crate::program::{NO_EQUILIBRIUM, Outcome, Place, edited, refuses};
 use crate::troubled;
 
 #[test]
 fn refuses_accuracies_that_are_none() {
     refuses(
-        BAD_INPUT,
-        &[
-            (
-                "zero",
-                &[("analysis", "accuracy = ^0.0\nanalysis")],
-                &["`accuracy`: 0.0 is outside (0, 0.5]"],
-            ),
-            (
-                "more than a half",
-                &[("analysis", "accuracy = ^0.6\nanalysis")],
-                &["`accuracy`: 0.6 is outside (0, 0.5]"],
-            ),
-            (
-                "negative",
-                &[("analysis", "accuracy = ^-0.01\nanalysis")],
-                &["`accuracy`: -0.01 is outside (0, 0.5]"],
-            ),
-            (
-                "a text",
-                &[("analysis", "accuracy = ^\"high\"\nanalysis")],
-                &["`accuracy`: found the text \"high\", expected a number"],
-            ),
-            (
-                "the mesh as a part of nothing",
-                &[("analysis", "accuracy_with_mesh = ^true\nanalysis")],
-                &[
-                    "`accuracy_with_mesh` counts the error of the mesh as part of `accuracy`, and there is none",
-                    "`accuracy = 0.02`",
-                ],
-            ),
-        ],
+        r#"
+zero
+  analysis => accuracy = ^0.0\nanalysis
+  `accuracy`: 0.0 is outside (0, 0.5]
+more than a half
+  analysis => accuracy = ^0.6\nanalysis
+  `accuracy`: 0.6 is outside (0, 0.5]
+negative
+  analysis => accuracy = ^-0.01\nanalysis
+  `accuracy`: -0.01 is outside (0, 0.5]
+a text
+  analysis => accuracy = ^"high"\nanalysis
+  `accuracy`: found the text "high", expected a number
+the mesh as a part of nothing
+  analysis => accuracy_with_mesh = ^true\nanalysis
+  `accuracy_with_mesh` counts the error of the mesh as part of `accuracy`, and there is none
+  `accuracy = 0.02`
+"#,
     );
 }
 
@@ -46,10 +33,8 @@ fn an_accuracy_that_was_asked_for_is_reached() {
     let place = Place::new();
     let asked = 0.01;
     let text = edited(HARDENING).replacen("analysis", "accuracy = 0.01\nanalysis", 1);
-    let outcome = place.run_case(text);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    let summary = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
-    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    place.done_case(text);
+    let summary = place.summary();
     let chosen = &summary["accuracy"];
     assert_eq!(chosen["asked"], 0.01);
     assert_eq!(chosen["is_reached"], true);
@@ -64,8 +49,7 @@ fn an_accuracy_that_was_asked_for_is_reached() {
     fine = fine.replacen("[solver]\n", solver, 1);
     fine = fine.replacen("increments = 8", &format!("increments = {finer}"), 1);
     place.write("fine.toml", fine);
-    let outcome = place.run(&["run", "fine.toml", "--out", "fine"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&["run", "fine.toml", "--out", "fine"]);
     let fine = history(&place, "fine", finer);
     for probe in ["settlement", "tau"] {
         let largest = fine
@@ -129,7 +113,7 @@ fn finer_trials_that_fail_leave_the_best_one_with_its_error() {
     );
     assert!(outcome.says("run 4 failed: phase `push`"), "{said}");
     assert_eq!(chosen["verdict"], "not reached");
-    let report = std::fs::read_to_string(place.path("out/report.html")).unwrap();
+    let report = place.read("out/report.html");
     assert!(report.contains("accuracy 0.00001 not reached, error "));
     assert_eq!(chosen["is_reached"], false);
     assert_eq!(chosen["increments"][1][1], 8);
@@ -148,7 +132,7 @@ fn finer_trials_that_fail_leave_the_best_one_with_its_error() {
         return;
     };
     let finer = softening("").replacen("increments = 8", "increments = 1024", 1);
-    assert_eq!(place.run_case(finer).code, Some(DONE));
+    place.done_case(finer);
     let fine = history(&place, "out", 1024);
     let error = |probe: &str| {
         let of = |rows: &[Row]| -> Vec<f64> { rows.iter().map(|r| number(r, probe)).collect() };
@@ -184,11 +168,7 @@ fn an_accuracy_that_too_few_trials_tell_is_not_known() {
     let Some((place, outcome, chosen)) = refused("LEAST_TIME=3.0") else {
         return;
     };
-    assert!(
-        outcome.says("a single run came to its end"),
-        "{}",
-        outcome.stderr
-    );
+    outcome.shows("a single run came to its end");
     assert_eq!(chosen["verdict"], "not known");
     assert!(chosen["difference"].is_null());
     assert_eq!(history(&place, "out", 2).len(), 2);
@@ -197,8 +177,9 @@ fn an_accuracy_that_too_few_trials_tell_is_not_known() {
     let Some(place) = troubled::place("LEAST_TIME=5.0") else {
         return;
     };
-    let outcome = place.run_case(softening("accuracy = 1e-5"));
-    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
+    place
+        .run_case(softening("accuracy = 1e-5"))
+        .ended(NO_EQUILIBRIUM);
 }
 
 #[test]
@@ -230,9 +211,9 @@ fn an_accuracy_with_the_mesh_is_reached_on_a_finer_one() {
         assert!(fine.contains(from), "{from}");
         fine = fine.replacen(from, to, 1);
     }
-    assert_eq!(place.run_case(&fine).code, Some(DONE));
+    place.done_case(&fine);
     let fine = history(&place, "out", 128);
-    assert_eq!(place.run_case(edited(HARDENING)).code, Some(DONE));
+    place.done_case(edited(HARDENING));
     let file = history(&place, "out", 8);
     let error = |rows: &[Row], probe: &str| {
         let every = fine.len() / rows.len();
@@ -269,9 +250,7 @@ fn the_error_of_a_mesh_that_no_finer_one_tells_is_not_known() {
         "{chosen}"
     );
     assert!(chosen["without_mesh"].as_f64().unwrap() <= 0.05, "{chosen}");
-    assert!(
-        outcome.says("error of the mesh: none, there is no finer mesh to tell it; mesh / 2 failed")
-    );
+    outcome.shows("error of the mesh: none, there is no finer mesh to tell it; mesh / 2 failed");
     let failed = chosen["failed"].as_array().unwrap();
     assert!(
         failed
@@ -309,14 +288,6 @@ fn meshes_that_diverge_have_no_error() {
         chosen["mesh"]["error"].is_null() && chosen["mesh"]["worst"] == "edge",
         "{chosen}"
     );
-    assert!(
-        outcome.says("the results do not converge under refinement"),
-        "{}",
-        outcome.stderr
-    );
-    assert!(
-        outcome.says("the runs differ most in `edge`"),
-        "{}",
-        outcome.stderr
-    );
+    outcome.shows("the results do not converge under refinement");
+    outcome.shows("the runs differ most in `edge`");
 }

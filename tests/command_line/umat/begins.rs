@@ -35,7 +35,7 @@ fn routines_that_begin_again_are_named() {
         } else {
             DONE
         };
-        assert_eq!(outcome.code, Some(code), "{}", outcome.stderr);
+        outcome.ended(code);
     }
 }
 
@@ -48,7 +48,7 @@ fn routines_that_begin_once_are_not() {
     for what in [0, 5, 6, 7] {
         let set = format!("what={what}");
         let (checks, outcome) = checked(&place, "begins", &["--set", &set]);
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        outcome.ended(DONE);
         for id in [CHECK, "time-as-declared", "routine-stays-at-rest"] {
             let [found, details] = &checks[id];
             assert_eq!(found, "passed", "{what}: {id}: {details}");
@@ -67,7 +67,7 @@ fn a_step_kept_from_the_last_call_is_named() {
     assert_eq!(found, "failed", "{details}");
     let said = "when it is repeated: something is kept from call to call (SAVE, COMMON)";
     assert!(details.contains(said), "{details}");
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    outcome.ended(PLUGIN_TROUBLE);
 }
 
 /// A routine that depends on the time may depend on that of the step, which is reported all the same.
@@ -76,7 +76,7 @@ fn the_time_of_a_step_is_asked_for_where_the_time_counts() {
     let Some(place) = place("begins") else {
         return;
     };
-    let sidecar = std::fs::read_to_string(place.path("begins.law.toml")).unwrap();
+    let sidecar = place.read("begins.law.toml");
     place.write(
         "begins.law.toml",
         format!("time_dependent = true\n{sidecar}"),
@@ -88,5 +88,5 @@ fn the_time_of_a_step_is_asked_for_where_the_time_counts() {
         details.contains("with TIME(1) = 0 in place of 1 STRESS ["),
         "{details}"
     );
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    outcome.ended(DONE);
 }

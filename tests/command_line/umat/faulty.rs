@@ -22,21 +22,19 @@ fn a_routine_that_ends_its_process_ends_an_increment() {
     ] {
         let parameters = format!("how = {how}\nlimit = 1.1e-3");
         place.write("driver.toml", driver("stops", "", &parameters));
-        let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
-        assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+        let outcome = place
+            .run(&["point", "driver.toml", "--csv", "out.csv"])
+            .ended(PLUGIN_TROUBLE);
         for text in says {
-            assert!(outcome.says(text), "{text}\n{}", outcome.stderr);
+            outcome.shows(text);
         }
-        assert!(
-            outcome.says("segment 1, increment 6 of 10"),
-            "{}",
-            outcome.stderr
-        );
-        let rows = std::fs::read_to_string(place.path("out.csv")).unwrap();
+        outcome.shows("segment 1, increment 6 of 10");
+        let rows = place.read("out.csv");
         assert_eq!(rows.lines().count(), 7, "{rows}");
-        let outcome = place.run(&["replay", "out.failure.toml"]);
-        assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
-        assert!(outcome.stdout.contains("as recorded"), "{}", outcome.stdout);
+        let outcome = place
+            .run(&["replay", "out.failure.toml"])
+            .ended(PLUGIN_TROUBLE);
+        outcome.prints("as recorded");
     }
 }
 
@@ -52,16 +50,12 @@ fn a_tangent_that_is_left_unset_is_named() {
         "driver.toml",
         text.replacen("11 = { strain = 1e-3 }", "11 = { stress = -10.0 }", 1),
     );
-    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
-    assert_eq!(outcome.code, Some(2), "{}", outcome.stderr);
-    assert!(outcome.says("DDSDDE of a UMAT"), "{}", outcome.stderr);
-    assert!(!outcome.says("beyond strength"), "{}", outcome.stderr);
+    let outcome = place
+        .run(&["point", "driver.toml", "--csv", "out.csv"])
+        .ended(2);
+    outcome.shows("DDSDDE of a UMAT").hides("beyond strength");
     let outcome = place.run(&["check", "libunset.so"]);
-    assert!(
-        outcome.stdout.contains("the routine leaves it unset"),
-        "{}",
-        outcome.stdout
-    );
+    outcome.prints("the routine leaves it unset");
 }
 
 #[test]
@@ -78,22 +72,18 @@ fn a_routine_without_an_answer_is_the_librarys_fault() {
         for (limit, at) in [("-1.0", "initial state"), ("1.1e-3", "increment 6 of 10")] {
             let parameters = format!("how = {how}\nlimit = {limit}");
             place.write("driver.toml", driver("stops", "", &parameters));
-            let outcome = place.run(&["point", "driver.toml"]);
-            assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
-            for text in [says, at] {
-                assert!(outcome.says(text), "{text}\n{}", outcome.stderr);
-            }
+            let outcome = place.run(&["point", "driver.toml"]).ended(PLUGIN_TROUBLE);
+            outcome.shows(says).shows(at);
         }
         // The first increment of the run makes strains of 0.05 %.
         for limit in ["-1.0", "7e-4"] {
             let parameters = format!("poisson_ratio = 0.3, how = {how}, limit = {limit} }}");
             let case = soil("stops", "").replacen("poisson_ratio = 0.3 }", &parameters, 1);
-            let outcome = place.run_case(case);
-            assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
-            assert!(outcome.says(says), "{says}\n{}", outcome.stderr);
+            place.run_case(case).ended(PLUGIN_TROUBLE).shows(says);
         }
-        let outcome = place.run(&["replay", "out/failure.toml"]);
-        assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+        place
+            .run(&["replay", "out/failure.toml"])
+            .ended(PLUGIN_TROUBLE);
     }
 }
 
@@ -124,6 +114,6 @@ fn what_is_overwritten_is_named() {
             "{what}: {}",
             outcome.stderr
         );
-        assert!(outcome.says(says), "{says}\n{}", outcome.stderr);
+        outcome.shows(says);
     }
 }

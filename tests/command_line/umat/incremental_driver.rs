@@ -1,7 +1,7 @@
 //! Input of the IncrementalDriver, with an elastic routine.
 
 use super::{number, place};
-use crate::program::{BAD_INPUT, DONE, NO_EQUILIBRIUM, Place};
+use crate::program::{BAD_INPUT, NO_EQUILIBRIUM, Place};
 use tests::case::table;
 
 /// Input of the IncrementalDriver for a material with E = 2e4 and ν = 0.3.
@@ -33,7 +33,7 @@ fn input_of_the_incremental_driver_is_followed() {
          *Repetition\n2 3\n*LinearLoad\n2 100 1.0\n*Rendulic\n1 5.0\n0 0\n0 0\n0 0\n0 0\n0 0\n\
          *PureCreep\n1 1 0.5\n*End\nwhatever follows\n",
     );
-    let outcome = place.run(&[
+    place.done(&[
         "point",
         "test.inp",
         "--umat",
@@ -41,7 +41,6 @@ fn input_of_the_incremental_driver_is_followed() {
         "--csv",
         "out.csv",
     ]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
     let rows = table(&place.path("out.csv"));
     assert_eq!(rows.len(), 1 + 6 * 4 + 3 * 2 + 8 + 3 * 3);
     let (g, lambda) = (2e4 / 2.6, 2e4 * 0.3 / (1.3 * 0.4));
@@ -114,8 +113,7 @@ fn every_so_many_states_are_written() {
             "--csv",
             "out.csv",
         ];
-        let outcome = place.run(&command);
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        place.done(&command);
         table(&place.path("out.csv"))
     };
     let all = run([""; 3]);
@@ -151,7 +149,7 @@ fn restrictions_between_stress_and_strain_are_obeyed() {
          *Repetition\n1 2\n*ObeyRestrictions\n2 100 1.0\nsd1 - 2*sd2 = 0\nsd2 - sd3 = 0\n\
          sd1 = -10\nsd4 = 0\nsd5 = 0\nsd6 = 0\n",
     );
-    let outcome = place.run(&[
+    place.done(&[
         "point",
         "test.inp",
         "--umat",
@@ -159,7 +157,6 @@ fn restrictions_between_stress_and_strain_are_obeyed() {
         "--csv",
         "out.csv",
     ]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
     let rows = table(&place.path("out.csv"));
     assert_eq!(rows.len(), 1 + 4 + 4 + 2 * 2);
     let g = 2e4 / 2.6;
@@ -210,8 +207,7 @@ fn restrictions_are_followed_where_a_law_flows() {
             "6\n-100\n-100\n-100\n0\n0\n0\n1\n0\n",
         );
         let library = "libdrucker_prager.so";
-        let outcome = place.run(&["point", "test.inp", "--umat", library, "--csv", "out.csv"]);
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        place.done(&["point", "test.inp", "--umat", library, "--csv", "out.csv"]);
         table(&place.path("out.csv"))
     };
     let restricted = run(
@@ -248,126 +244,67 @@ fn restrictions_that_contradict_each_other_are_not_met() {
         &place,
         "*ObeyRestrictions\n1 100 1.0\nsd1 = -1\n2*sd1 = -4\nsd3 = 0\nsd4 = 0\nsd5 = 0\nsd6 = 0\n",
     );
-    let outcome = place.run(&["point", "test.inp", "--umat", "libelastic.so"]);
-    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
-    assert!(outcome.says("cannot be met"), "{}", outcome.stderr);
+    let outcome = place
+        .run(&["point", "test.inp", "--umat", "libelastic.so"])
+        .ended(NO_EQUILIBRIUM);
+    outcome.shows("cannot be met");
 }
 
-/// Runs the elastic routine through tests that must be refused, each with what is reported.
-fn refused(tests: &[(&str, &[&str])]) {
+/// Runs the elastic routine through tests that must be refused: rows of the test, with `\n` for the end of a line, and
+/// what is reported.
+fn refused(tests: &str) {
     let Some(place) = place("elastic") else {
         return;
     };
-    for (test, says) in tests {
-        incremental(&place, test);
+    for row in tests.lines().skip(1) {
+        let mut parts = row.split(" | ");
+        incremental(&place, &parts.next().unwrap().replace("\\n", "\n"));
         let outcome = place.run(&["point", "test.inp", "--umat", "libelastic.so"]);
-        assert_eq!(outcome.code, Some(BAD_INPUT), "{test}: {}", outcome.stderr);
-        for text in *says {
-            assert!(outcome.says(text), "{test}: {text}\n{}", outcome.stderr);
+        assert_eq!(outcome.code, Some(BAD_INPUT), "{row}: {}", outcome.stderr);
+        for text in parts {
+            assert!(outcome.says(text), "{row}: {text}\n{}", outcome.stderr);
         }
     }
 }
 
 #[test]
 fn restrictions_without_sense_are_refused() {
-    refused(&[
-        (
-            "*PureCreep\n1 1 1\n*ObeyRestrictions\n1 1 1\nsd1 = 0\n",
-            &["a restriction, of which there are six"],
-        ),
-        (
-            "*ObeyRestrictions\n1 1 1\nsd1 + 2\n",
-            &["test.inp:4:1", "a restriction has a `=`"],
-        ),
-        (
-            "*ObeyRestrictions\n1 1 1\nsd1 + 2*s2 = 1\n",
-            &["test.inp:4:1", "`2*s2` is no change", "ed1 to ed6"],
-        ),
-        (
-            "*ObeyRestrictions\n1 1 1\nsd7 = 1\n",
-            &["test.inp:4:1", "`sd7` is no change"],
-        ),
-        (
-            "*ObeyRestrictions\n1 1 1\nx*sd1 = 1\n",
-            &["test.inp:4:1", "`x*sd1` is no change"],
-        ),
-        (
-            "*ObeyRestrictions\n1 1 1\nsd1 = sd2\n",
-            &["test.inp:4:1", "`sd2` is no number"],
-        ),
-        (
-            "*ObeyRestrictions\n1 1 1\nsd1 - sd1 = 1\n",
-            &["test.inp:4:1", "restricts nothing"],
-        ),
-    ]);
+    refused(
+        r"
+*PureCreep\n1 1 1\n*ObeyRestrictions\n1 1 1\nsd1 = 0\n | a restriction, of which there are six
+*ObeyRestrictions\n1 1 1\nsd1 + 2\n | test.inp:4:1 | a restriction has a `=`
+*ObeyRestrictions\n1 1 1\nsd1 + 2*s2 = 1\n | test.inp:4:1 | `2*s2` is no change | ed1 to ed6
+*ObeyRestrictions\n1 1 1\nsd7 = 1\n | test.inp:4:1 | `sd7` is no change
+*ObeyRestrictions\n1 1 1\nx*sd1 = 1\n | test.inp:4:1 | `x*sd1` is no change
+*ObeyRestrictions\n1 1 1\nsd1 = sd2\n | test.inp:4:1 | `sd2` is no number
+*ObeyRestrictions\n1 1 1\nsd1 - sd1 = 1\n | test.inp:4:1 | restricts nothing
+",
+    );
 }
 
 #[test]
 fn what_is_not_read_of_the_incremental_driver_is_said() {
-    refused(&[
-        (
-            "*DeformationGradient\n1 1 1\n",
-            &["test.inp:2:1", "small strains"],
-        ),
-        (
-            "*TriaxialE1\n10 1 0\n1\n",
-            &["test.inp:3:1", "a time above 0, not 0"],
-        ),
-        (
-            "*TriaxialE1\n10 1 -1\n1\n",
-            &["test.inp:3:1", "a time above 0, not -1"],
-        ),
-        (
-            "*TriaxialE1\n10 1 1 0.5\n1\n",
-            &["test.inp:3:1", "`0.5` is a number too many"],
-        ),
-        (
-            "*TriaxialE1\n10 1 1\n1 2\n",
-            &["test.inp:4:1", "`2` is a number too many"],
-        ),
-        (
-            "*TriaxialE1\n10 1 1: 2.5\n1\n",
-            &["test.inp:3:1", "2.5 is no number for every how many"],
-        ),
-        (
-            "*TriaxialE1\n10 1 1: -2\n1\n",
-            &["test.inp:3:1", "-2 is no number for every how many"],
-        ),
-        (
-            "*TriaxialE1\n10 1 1: 5 T 20.0\n1\n",
-            &["test.inp:3:1", "a change of temperature"],
-        ),
-        (
-            "*Repetition\n1 0\n*PureCreep\n1 1 1\n",
-            &["test.inp:3:1", "at least once"],
-        ),
-        (
-            "*Repetition\n0 2\n*PureCreep\n1 1 1\n",
-            &["test.inp:3:1", "at least one step"],
-        ),
-        (
-            "*OedometricE1 ? s1 > 3\n1 1 1\n1\n",
-            &["test.inp:2:1", "ends a step early"],
-        ),
-        (
-            "*Oedometric\n1 1 1\n1\n",
-            &["test.inp:2:1", "no keyword", "*OedometricE1"],
-        ),
-        ("*LinearLoad\n1 1 1\n*Haigh\n", &["test.inp:4:1", "*Roscoe"]),
-        (
-            "*LinearLoad\n1 1 1\n*Roscoe\n2 1.0\n",
-            &["test.inp:5:1", "expected 0 (strain) or 1 (stress)"],
-        ),
-        (
-            "*TriaxialE1\n10 x\n",
-            &["test.inp:3:1", "number of increments"],
-        ),
-        (
-            "*TriaxialE1\n10 1 1\n",
-            &["the file ends where the change over the step is expected"],
-        ),
-        ("", &["the test has no step"]),
-    ]);
+    refused(
+        r"
+*DeformationGradient\n1 1 1\n | test.inp:2:1 | small strains
+*TriaxialE1\n10 1 0\n1\n | test.inp:3:1 | a time above 0, not 0
+*TriaxialE1\n10 1 -1\n1\n | test.inp:3:1 | a time above 0, not -1
+*TriaxialE1\n10 1 1 0.5\n1\n | test.inp:3:1 | `0.5` is a number too many
+*TriaxialE1\n10 1 1\n1 2\n | test.inp:4:1 | `2` is a number too many
+*TriaxialE1\n10 1 1: 2.5\n1\n | test.inp:3:1 | 2.5 is no number for every how many
+*TriaxialE1\n10 1 1: -2\n1\n | test.inp:3:1 | -2 is no number for every how many
+*TriaxialE1\n10 1 1: 5 T 20.0\n1\n | test.inp:3:1 | a change of temperature
+*Repetition\n1 0\n*PureCreep\n1 1 1\n | test.inp:3:1 | at least once
+*Repetition\n0 2\n*PureCreep\n1 1 1\n | test.inp:3:1 | at least one step
+*OedometricE1 ? s1 > 3\n1 1 1\n1\n | test.inp:2:1 | ends a step early
+*Oedometric\n1 1 1\n1\n | test.inp:2:1 | no keyword | *OedometricE1
+*LinearLoad\n1 1 1\n*Haigh\n | test.inp:4:1 | *Roscoe
+*LinearLoad\n1 1 1\n*Roscoe\n2 1.0\n | test.inp:5:1 | expected 0 (strain) or 1 (stress)
+*TriaxialE1\n10 x\n | test.inp:3:1 | number of increments
+*TriaxialE1\n10 1 1\n | the file ends where the change over the step is expected
+ | the test has no step
+",
+    );
 }
 
 #[test]
@@ -377,13 +314,9 @@ fn parameters_are_those_of_the_sidecar() {
     };
     incremental(&place, "*PureCreep\n1 1 1\n");
     place.write("parameters.inp", "elastic\n3\n1\n1\n1\n");
-    let outcome = place.run(&["point", "test.inp", "--umat", "libelastic.so"]);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    for text in [
-        "parameters.inp:2:1",
-        "3 parameters",
-        "young_modulus, poisson_ratio",
-    ] {
-        assert!(outcome.says(text), "{text}\n{}", outcome.stderr);
-    }
+    let outcome = place.refused(&["point", "test.inp", "--umat", "libelastic.so"]);
+    outcome
+        .shows("parameters.inp:2:1")
+        .shows("3 parameters")
+        .shows("young_modulus, poisson_ratio");
 }

@@ -2,10 +2,11 @@
 //! law `mohr_coulomb`, of which it shares no line.
 
 use super::{last, number, place, rows, soil};
-use crate::program::{CASE, DONE};
+use crate::program::CASE;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use tests::case::table;
+use tests::tolerance::near;
 
 /// Both compute in doubles, in another order; relative to 100 kPa and to a strain of 1 %.
 const ROUND_OFF: f64 = 1e-13;
@@ -185,8 +186,7 @@ fn its_own_tangent_converges_quadratically() {
             assert!(text.contains(from), "{from}");
             text.replacen(from, to, 1)
         });
-        let outcome = place.run_case(text);
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        place.done_case(text);
         let iterations = table(&place.path("out/history.csv"));
         let iterations = iterations.iter().map(|row| number(row, "iterations"));
         (last(&place), iterations.collect::<Vec<_>>())
@@ -197,17 +197,14 @@ fn its_own_tangent_converges_quadratically() {
     assert_eq!(their_iterations, our_iterations);
     for (theirs, ours) in theirs.iter().zip(&ours) {
         // The tolerance of the iterations, 1e-8, squared by the last of them.
-        assert!(
-            (theirs - ours).abs() <= 1e-11 * ours.abs(),
-            "{theirs} {ours}"
-        );
+        near(*theirs, *ours, 1e-11 * ours.abs());
     }
     let rows = table(&place.path("out/history.csv"));
     assert!(number(rows.last().unwrap(), "flow") > 1e-4);
 
     // r_(k+1) ≤ C r_k² below r = 1/(3 C), to the round-off of forces.
     let (c, floor) = (100.0, 1e-11);
-    let log = std::fs::read_to_string(place.path("out/log.jsonl")).unwrap();
+    let log = place.read("out/log.jsonl");
     let events = log.lines().map(|line| {
         let event: serde_json::Value = serde_json::from_str(line).unwrap();
         event

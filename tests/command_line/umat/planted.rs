@@ -20,7 +20,7 @@ fn a_correct_one_passes() {
         return;
     };
     let (checks, outcome) = planted(&place, 0, &[]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    outcome.ended(DONE);
     for (id, [found, details]) in &checks {
         let is_well = ["passed", "skipped"].contains(&found.as_str());
         assert!(is_well, "{id} {found}: {details}");
@@ -29,98 +29,35 @@ fn a_correct_one_passes() {
     assert!(details.contains(" of them inelastic"), "{details}");
 }
 
+/// Number of the mistake, check, outcome, and a part of what is said.
+const PLANTED: &str = "
+1 routine-stays-at-rest failed has left STATEV(1), `plastic_strain`, as it was
+1 paths-leave-elasticity passed never changed: `plastic_strain`
+2 paths-leave-elasticity warning component `12` of the flux, number 4, stays what it was in all
+2 ddsdde-matches-differences warning in this increment: is it returned?
+3 routine-stays-at-rest failed STRESS(3), 33, is what elasticity alone gives
+4 response-is-isotropic warning the shear modulus is 2.000 times (D11 − D12)/2, where shear strains are γ = 2ε: they are handed over as γ
+4 ddsdde-matches-differences warning STRESS changes by twice what DDSDDE says
+5 ddsdde-matches-differences warning STRESS changes by half of what DDSDDE says
+6 routine-stays-inside failed beyond the end of STATEV, which has 1 entries: entry 41 becomes
+7 routine-stays-inside failed in front of STATEV: entry 0 becomes
+9 routine-stays-inside failed the routine reads beyond the end of STATEV, which has 1 entries, or in front of DDSDDE
+10 time-as-declared warning and STRESS of the next increment changes
+11 routine-is-repeatable warning with another NPT: STRESS [
+12 paths-leave-elasticity warning the routine asks for a smaller increment, PNEWDT = 0.5
+";
+
 #[test]
 fn each_mistake_is_called_by_its_name() {
     let Some(place) = place("planted") else {
         return;
     };
-    for (what, id, expected, said) in [
-        (
-            1,
-            "routine-stays-at-rest",
-            "failed",
-            "has left STATEV(1), `plastic_strain`, as it was",
-        ),
-        (
-            1,
-            "paths-leave-elasticity",
-            "passed",
-            "never changed: `plastic_strain`",
-        ),
-        (
-            2,
-            "paths-leave-elasticity",
-            "warning",
-            "component `12` of the flux, number 4, stays what it was in all",
-        ),
-        (
-            2,
-            "ddsdde-matches-differences",
-            "warning",
-            "in this increment: is it returned?",
-        ),
-        (
-            3,
-            "routine-stays-at-rest",
-            "failed",
-            "STRESS(3), 33, is what elasticity alone gives",
-        ),
-        (
-            4,
-            "response-is-isotropic",
-            "warning",
-            "the shear modulus is 2.000 times (D11 − D12)/2, where shear strains are γ = 2ε: they are handed \
-             over as γ",
-        ),
-        (
-            4,
-            "ddsdde-matches-differences",
-            "warning",
-            "STRESS changes by twice what DDSDDE says",
-        ),
-        (
-            5,
-            "ddsdde-matches-differences",
-            "warning",
-            "STRESS changes by half of what DDSDDE says",
-        ),
-        (
-            6,
-            "routine-stays-inside",
-            "failed",
-            "beyond the end of STATEV, which has 1 entries: entry 41 becomes",
-        ),
-        (
-            7,
-            "routine-stays-inside",
-            "failed",
-            "in front of STATEV: entry 0 becomes",
-        ),
-        (
-            9,
-            "routine-stays-inside",
-            "failed",
-            "the routine reads beyond the end of STATEV, which has 1 entries, or in front of DDSDDE",
-        ),
-        (
-            10,
-            "time-as-declared",
-            "warning",
-            "and STRESS of the next increment changes",
-        ),
-        (
-            11,
-            "routine-is-repeatable",
-            "warning",
-            "with another NPT: STRESS [",
-        ),
-        (
-            12,
-            "paths-leave-elasticity",
-            "warning",
-            "the routine asks for a smaller increment, PNEWDT = 0.5",
-        ),
-    ] {
+    for row in PLANTED.lines().skip(1) {
+        let row: Vec<&str> = row.splitn(4, ' ').collect();
+        let [what, id, expected, said] = row[..] else {
+            panic!("{row:?}")
+        };
+        let what = what.parse().unwrap();
         let (checks, outcome) = planted(&place, what, &[]);
         let [found, details] = &checks[id];
         assert_eq!(found, expected, "{what}: {id}: {details}");
@@ -141,10 +78,9 @@ fn a_run_tells_what_is_written_beyond_an_array() {
                   hypothesis = \"plane_strain\"\nparameters = { what = 6 }\n\
                   [[segment]]\nincrements = 10\ncontrol = { 12 = { strain = 1e-2 } }\n";
     place.write("driver.toml", driver);
-    let outcome = place.run(&["point", "driver.toml"]);
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    let outcome = place.run(&["point", "driver.toml"]).ended(PLUGIN_TROUBLE);
     let said = "beyond the end of STATEV, which has 1 entries: entry 41 becomes";
-    assert!(outcome.says(said), "{}", outcome.stderr);
+    outcome.shows(said);
 }
 
 /// A STOP far away fails one check, which is shown among those that fail; the others go on nearby.
@@ -154,7 +90,7 @@ fn a_stop_far_away_is_a_failure_of_one_check() {
         return;
     };
     let (checks, outcome) = planted(&place, 8, &["--only-failed"]);
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    outcome.ended(PLUGIN_TROUBLE);
     // The others warn of it.
     let failing = checks.iter().filter(|(_, [found, _])| found != "warning");
     let ids: Vec<&String> = failing.map(|(id, _)| id).collect();
@@ -180,7 +116,7 @@ fn paths_that_never_yield_are_told_of() {
         return;
     };
     let (checks, outcome) = planted(&place, 3, &["--set", "yield_stress=1e9"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    outcome.ended(DONE);
     let [found, details] = &checks["paths-leave-elasticity"];
     assert_eq!(found, "warning", "{details}");
     assert!(
@@ -197,7 +133,7 @@ fn parameters_without_a_ground_are_named() {
     };
     let path = place.path("planted.law.toml");
     std::fs::remove_file(&path).unwrap();
-    let outcome = place.run(&[
+    place.done(&[
         "new-sidecar",
         "libplanted.so",
         "--nprops",
@@ -205,7 +141,6 @@ fn parameters_without_a_ground_are_named() {
         "--nstatv",
         "1",
     ]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
     let (checks, _) = checked(&place, "planted", &["--set", "prop_2=0.3"]);
     let [found, details] = &checks["sidecar-is-read"];
     assert_eq!(found, "warning", "{details}");
@@ -245,12 +180,11 @@ fn a_parameter_that_the_sidecar_lacks_is_told() {
         "--nstatv",
         "1",
     ];
-    let outcome = place.run(&arguments);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&arguments);
     let all = ["prop_1=5e5", "prop_2=0.3", "prop_3=200"];
     let all: Vec<&str> = all.iter().flat_map(|set| ["--set", set]).collect();
     let (checks, outcome) = checked(&place, "planted", &all);
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    outcome.ended(PLUGIN_TROUBLE);
     let [found, details] = &checks["routine-answers"];
     assert_eq!(found, "failed", "{details}");
     let said = "the routine reads beyond the end of PROPS, which has 3 entries";

@@ -1,7 +1,7 @@
 //! Calls of routines that are recorded, for a debugger.
 
 use super::{driver, number, place, recorded, rows, soil};
-use crate::program::{BAD_INPUT, CASE, DONE, PLUGIN_TROUBLE};
+use crate::program::{CASE, PLUGIN_TROUBLE};
 use tests::case::table;
 
 #[test]
@@ -10,7 +10,7 @@ fn a_call_can_be_recorded() {
         return;
     };
     let rows = rows(&place, &driver("elastic", "record = \"call.toml\"", ""));
-    let text = std::fs::read_to_string(place.path("call.toml")).unwrap();
+    let text = place.read("call.toml");
     let call: toml::Table = toml::from_str(&text).unwrap();
     let argument = |when: &str, name: &str| call[when][name].clone();
     let reals = |when: &str, name: &str| -> Vec<f64> {
@@ -42,13 +42,8 @@ fn the_option_records_a_call() {
     // What stood there is not mistaken for a record.
     place.write("call.toml", "an earlier one");
     let arguments = ["point", "driver.toml", "--record", "call.toml"];
-    let outcome = place.run(&[&arguments[..], &["--csv", "out.csv"]].concat());
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(
-        outcome.says("all arguments of one call in call.toml"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = place.done(&[&arguments[..], &["--csv", "out.csv"]].concat());
+    outcome.shows("all arguments of one call in call.toml");
     assert_eq!(recorded(&place, "call.toml", "before", "STRESS"), [0.0; 4]);
     let rows = table(&place.path("out.csv"));
     assert_eq!(
@@ -57,8 +52,7 @@ fn the_option_records_a_call() {
     );
 
     place.write("case.toml", soil("elastic", ""));
-    let outcome = place.run(&["run", "case.toml", "--out", "out", "--record", "run.toml"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&["run", "case.toml", "--out", "out", "--record", "run.toml"]);
     assert_eq!(recorded(&place, "run.toml", "before", "PROPS"), [1e4, 0.3]);
 
     // With the native law there is nothing to record, with two it is not plain which.
@@ -84,14 +78,12 @@ fn the_option_records_a_call() {
         ("point", "own.toml", "law `elastic` is no UMAT"),
     ] {
         place.write("none.toml", "an earlier one");
-        let outcome = place.run(&[command, file, "--record", "none.toml"]);
-        assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-        assert!(outcome.says(says), "{says}\n{}", outcome.stderr);
+        let outcome = place.refused(&[command, file, "--record", "none.toml"]);
+        outcome.shows(says);
     }
-    let outcome = place.run(&["point", "driver.toml", "--record", "no/where.toml"]);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+    place.refused(&["point", "driver.toml", "--record", "no/where.toml"]);
     // What stood there is not lost to a command that was refused.
-    let kept = std::fs::read_to_string(place.path("none.toml")).unwrap();
+    let kept = place.read("none.toml");
     assert_eq!(kept, "an earlier one");
 }
 
@@ -104,17 +96,19 @@ fn a_call_that_never_returns_is_recorded_too() {
         "driver.toml",
         driver("stops", "", "how = 1\nlimit = 1.1e-3"),
     );
-    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
-    let outcome = place.run(&["replay", "out.failure.toml", "--record", "call.toml"]);
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    place
+        .run(&["point", "driver.toml", "--csv", "out.csv"])
+        .ended(PLUGIN_TROUBLE);
+    place
+        .run(&["replay", "out.failure.toml", "--record", "call.toml"])
+        .ended(PLUGIN_TROUBLE);
     let rows = table(&place.path("out.csv"));
     let before = recorded(&place, "call.toml", "before", "STRESS");
     assert_eq!(
         before[1].to_bits(),
         number(rows.last().unwrap(), "stress_22").to_bits()
     );
-    let text = std::fs::read_to_string(place.path("call.toml")).unwrap();
+    let text = place.read("call.toml");
     assert!(
         text.ends_with("# The routine has not returned.\n"),
         "{text}"

@@ -23,8 +23,7 @@ fn who_supplies_what_a_routine_calls_is_said() {
     let (Some(calls), Some(utilities)) = (place("externals"), place("utilities")) else {
         return;
     };
-    let outcome = calls.run(&["inspect", "libexternals.so"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = calls.done(&["inspect", "libexternals.so"]);
     let line = |start: &str| {
         let mut lines = outcome.stdout.lines();
         lines
@@ -33,16 +32,8 @@ fn who_supplies_what_a_routine_calls_is_said() {
     };
     assert_eq!(line("missing"), "missing       getvrm_, mutexlock_");
     assert_eq!(line("from Pilum"), "");
-    assert!(
-        outcome.stdout.contains("nobody provides 2 of its symbols"),
-        "{}",
-        outcome.stdout
-    );
-    assert!(
-        outcome.stdout.contains("`externals = \"trap\"`"),
-        "{}",
-        outcome.stdout
-    );
+    outcome.prints("nobody provides 2 of its symbols");
+    outcome.prints("`externals = \"trap\"`");
     let found = json(&utilities.run(&["inspect", "libutilities.so", "--json"]));
     let names = |what: &str| -> Vec<&str> {
         found[what]
@@ -79,29 +70,21 @@ fn a_new_sidecar_can_be_used_at_once() {
         return;
     };
     let outcome = place.run(&["inspect", "libelastic.so"]);
-    assert!(
-        outcome
-            .stdout
-            .contains("without a sidecar: `pilum new-sidecar`"),
-        "{}",
-        outcome.stdout
-    );
+    outcome.prints("without a sidecar: `pilum new-sidecar`");
     let driver = "law = \"elastic\"\nadapter = \"umat\"\nlibrary = \"libelastic.so\"\n\
                   hypothesis = \"axisymmetric\"\nparameters = { prop_1 = 2e4, prop_2 = 0.3 }\n\
                   [[segment]]\nincrements = 2\ncontrol = { 22 = { strain = -1e-3 } }\n";
     place.write("driver.toml", driver);
-    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    let outcome = place
+        .run(&["point", "driver.toml", "--csv", "out.csv"])
+        .ended(PLUGIN_TROUBLE);
     let said = "--nprops N --nstatv M` writes one to fill in";
-    assert!(outcome.says(said), "{}", outcome.stderr);
+    outcome.shows(said);
     // Nothing is held against a sidecar that is not there.
-    let outcome = place.run(&["check", "libelastic.so"]);
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    let outcome = place.run(&["check", "libelastic.so"]).ended(PLUGIN_TROUBLE);
     let said = "cannot be checked: sidecar-is-read";
-    assert!(outcome.says(said), "{}", outcome.stderr);
-    assert!(!outcome.says("its sidecar says"), "{}", outcome.stderr);
-    let outcome = place.run(&["new-sidecar", "libelastic.so", "--nprops", "2"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    outcome.shows(said).hides("its sidecar says");
+    let outcome = place.done(&["new-sidecar", "libelastic.so", "--nprops", "2"]);
     let said = "sidecar in elastic.law.toml: 2 parameters, 0 internal variables";
     assert!(outcome.stdout.starts_with(said), "{}", outcome.stdout);
     let rows = rows(&place, driver);
@@ -109,13 +92,8 @@ fn a_new_sidecar_can_be_used_at_once() {
     assert!((stress + 20.0).abs() < 1e-9, "{stress}");
     // It is not written over.
     let before = std::fs::read(place.path("elastic.law.toml")).unwrap();
-    let outcome = place.run(&["new-sidecar", "libelastic.so", "--nprops", "3"]);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    assert!(
-        outcome.says("elastic.law.toml is there already"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = place.refused(&["new-sidecar", "libelastic.so", "--nprops", "3"]);
+    outcome.shows("elastic.law.toml is there already");
     assert_eq!(
         std::fs::read(place.path("elastic.law.toml")).unwrap(),
         before
@@ -128,8 +106,7 @@ fn a_new_sidecar_names_as_much_as_it_is_told() {
         return;
     };
     let arguments = "new-sidecar libjoint_3d.so --nprops 3 --nstatv 4 --ntens 2,3 --out other.toml";
-    let outcome = place.run(&arguments.split(' ').collect::<Vec<_>>());
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&arguments.split(' ').collect::<Vec<_>>());
     let driver = "law = \"joint_3d\"\nadapter = \"umat\"\nlibrary = \"libjoint_3d.so\"\n\
                   sidecar = \"other.toml\"\nhypothesis = \"interface_3d\"\n\
                   parameters = { prop_1 = 1e6, prop_2 = 1e5, prop_3 = 0.5 }\n\
@@ -207,17 +184,13 @@ fn laws_shows_a_routine_with_a_sidecar() {
     let Some(place) = place("maxwell") else {
         return;
     };
-    let outcome = place.run(&["laws", "libmaxwell.so"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    for said in [
-        "umat_maxwell: Maxwell body",
-        "relaxation_time",
-        "default 1000; > 0",
-        "depends on the time",
-        "adapter = \"umat\"\n  library = \"libmaxwell.so\"",
-    ] {
-        assert!(outcome.stdout.contains(said), "{said}: {}", outcome.stdout);
-    }
+    let outcome = place.done(&["laws", "libmaxwell.so"]);
+    outcome
+        .prints("umat_maxwell: Maxwell body")
+        .prints("relaxation_time")
+        .prints("default 1000; > 0")
+        .prints("depends on the time")
+        .prints("adapter = \"umat\"\n  library = \"libmaxwell.so\"");
     // The same by its id, where its folder is looked in, and in the list.
     let folder = place.path("");
     let folder = folder.to_str().unwrap();
@@ -242,11 +215,10 @@ fn laws_shows_a_routine_with_a_sidecar() {
     assert_eq!(page["id"], "umat_maxwell");
     assert_eq!(page["formulations"][0]["time_dependent"], true);
     // A sidecar that is wrong is told of at its place.
-    let sidecar = std::fs::read_to_string(place.path("maxwell.law.toml")).unwrap();
+    let sidecar = place.read("maxwell.law.toml");
     place.write("maxwell.law.toml", sidecar.replacen("ntens", "n_tens", 1));
-    let outcome = place.run(&["laws", "libmaxwell.so"]);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    assert!(outcome.says("maxwell.law.toml:5:1"), "{}", outcome.stderr);
+    let outcome = place.refused(&["laws", "libmaxwell.so"]);
+    outcome.shows("maxwell.law.toml:5:1");
 }
 
 /// Outcomes and details of all checks of a routine, and how the program ended.
@@ -372,7 +344,7 @@ fn a_routine_that_gives_up_far_away_is_checked_nearby() {
     let more = ["young_modulus=1e7", "how=2", "limit=0.05"].map(|set| format!("--set={set}"));
     let more: Vec<&str> = more.iter().map(String::as_str).collect();
     let (checks, outcome) = checked(&place, "stops", &more);
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    outcome.ended(PLUGIN_TROUBLE);
     for id in ["routine-stays-at-rest", "ddsdde-matches-differences"] {
         let [found, details] = &checks[id];
         assert_eq!(found, "warning", "{id}: {details}");
@@ -400,7 +372,7 @@ fn what_ends_many_checks_is_told_once() {
     let more = ["young_modulus=1e7", "how=1", "limit=0.05"].map(|set| format!("--set={set}"));
     let more: Vec<&str> = more.iter().map(String::as_str).collect();
     let (checks, outcome) = checked(&place, "stops", &more);
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+    outcome.ended(PLUGIN_TROUBLE);
     let told = |words: &str| {
         let all = checks.iter();
         all.filter(|(_, [_, details])| details.contains(words))
@@ -423,14 +395,14 @@ fn a_wrong_sidecar_is_told_once() {
     let Some(place) = place("elastic") else {
         return;
     };
-    let sidecar = std::fs::read_to_string(place.path("elastic.law.toml")).unwrap();
+    let sidecar = place.read("elastic.law.toml");
     place.write(
         "elastic.law.toml",
         sidecar.replacen("ntens = [4, 6]", "ntens = [4, 5]", 1),
     );
     for more in [&[][..], &["--in-process"]] {
         let (checks, outcome) = checked(&place, "elastic", more);
-        assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
+        outcome.ended(PLUGIN_TROUBLE);
         let failed = checks
             .iter()
             .filter(|(_, [outcome, _])| outcome == "failed");
@@ -461,23 +433,18 @@ fn checks_and_settings_that_do_not_fit_are_refused() {
     ];
     for (more, said) in cases {
         let (_, outcome) = checked(&place, "elastic", &more);
-        assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-        assert!(outcome.says(said), "{}", outcome.stderr);
+        let outcome = outcome.ended(BAD_INPUT);
+        outcome.shows(said);
     }
     let deps = std::env::current_exe()
         .unwrap()
         .parent()
         .unwrap()
         .join("libelastic.so");
-    let outcome = place.run(&["check", deps.to_str().unwrap(), "--only", "routine-answers"]);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    assert!(
-        outcome.says("this check is for UMATs"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = place.refused(&["check", deps.to_str().unwrap(), "--only", "routine-answers"]);
+    outcome.shows("this check is for UMATs");
     // One of them alone.
     let (checks, outcome) = checked(&place, "elastic", &["--only", "time-as-declared"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    outcome.ended(DONE);
     assert_eq!(checks.keys().collect::<Vec<_>>(), ["time-as-declared"]);
 }

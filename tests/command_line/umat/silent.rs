@@ -1,6 +1,6 @@
 //! A routine that refuses without saying so: `pilum point` says it.
 
-use super::{DONE, driver, place};
+use super::{driver, place};
 use crate::program::NO_EQUILIBRIUM;
 
 /// The driver goes to a strain of 2e-3 in ten increments.
@@ -24,8 +24,7 @@ fn a_routine_that_takes_no_notice_is_named() {
             "driver.toml",
             driver("silent", "", &format!("reach = {reach}")),
         );
-        let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        let outcome = place.done(&["point", "driver.toml", "--csv", "out.csv"]);
         let named = outcome.says("law `umat_silent` takes no notice of the strain");
         assert_eq!(named, said.is_some(), "{reach}: {}", outcome.stderr);
         if let Some(said) = said {
@@ -44,12 +43,10 @@ fn the_same_where_a_stress_is_asked_for_ends_with_exit_code_2() {
         "driver.toml",
         text.replacen("strain = -2e-3", "stress = -20.0", 1),
     );
-    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
-    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
-    for said in [
-        "stress `22` is 0.000000000e0 kPa at best",
-        "law `umat_silent` has no stiffness in the initial state",
-    ] {
-        assert!(outcome.says(said), "{}", outcome.stderr);
-    }
+    let outcome = place
+        .run(&["point", "driver.toml", "--csv", "out.csv"])
+        .ended(NO_EQUILIBRIUM);
+    outcome
+        .shows("stress `22` is 0.000000000e0 kPa at best")
+        .shows("law `umat_silent` has no stiffness in the initial state");
 }

@@ -2,6 +2,7 @@
 
 use super::{DONE, Place, number, place, rows};
 use std::collections::BTreeMap;
+use tests::tolerance::near;
 
 fn driver(hypothesis: &str, segments: &str) -> String {
     format!(
@@ -67,10 +68,7 @@ fn three_components_come_normal_first() {
     // 300 kPa press, so 150 kPa hold: 30 along t, what is left of them along s.
     let expected = f64::sqrt(150.0 * 150.0 - 30.0 * 30.0);
     let found = number(end, "traction_s");
-    assert!(
-        (found - expected).abs() < 1e-6 * expected,
-        "{found} {expected}"
-    );
+    near(found, expected, 1e-6 * expected);
 }
 
 #[test]
@@ -112,8 +110,7 @@ fn figures_draw_both_slips_and_the_friction_of_both() {
          [[figure]]\nname = \"friction\"\nx = \"u_s\"\ny = [\"mu\"]\n",
     );
     place.write("driver.toml", &text);
-    let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&["point", "driver.toml", "--csv", "out.csv"]);
     assert!(place.path("friction.svg").is_file());
     // No finite-element formulation takes it.
     let layer = crate::program::CASE
@@ -122,7 +119,7 @@ fn figures_draw_both_slips_and_the_friction_of_both() {
         .replacen("[laws.joint.parameters]\nnormal_stiffness = 1e6\nshear_stiffness = 4e5\n\
                    cohesion = 10.0\nfriction_angle = 30.0\ndilatancy_angle = 5.0\n",
                   "[laws.joint.parameters]\nnormal_stiffness = 1e6\nshear_stiffness = 4e5\nfriction = 0.5\n", 1);
-    let sidecar = std::fs::read_to_string(place.path("joint_3d.law.toml")).unwrap();
+    let sidecar = place.read("joint_3d.law.toml");
     place.write(
         "space.law.toml",
         sidecar
@@ -135,5 +132,5 @@ fn figures_draw_both_slips_and_the_friction_of_both() {
     );
     let outcome = place.run_case(layer);
     assert_ne!(outcome.code, Some(DONE));
-    assert!(outcome.says("interface_3d"), "{}", outcome.stderr);
+    outcome.shows("interface_3d");
 }

@@ -6,10 +6,10 @@
 //! Asserts     all increments; the loads of the exact tangent; iterations; one line about it; nothing is reported
 //!             of laws with consistent tangents; the same bits after a stop.
 
-use super::tolerance::summary;
 use super::{gfortran, number, place, source};
 use crate::program::{DONE, Outcome, Place};
 use tests::case::table;
+use tests::tolerance::near;
 
 /// What the solver leaves of a load, next to tolerances of 1e-9 and 1e-7.
 const SAME: f64 = 1e-6;
@@ -90,7 +90,7 @@ const ROUTINE: &str = "law = \"umat_mohr_coulomb\"\nadapter = \"umat\"\nlibrary 
 /// Iterations of all phases and the load on the head at the end; all increments must have been done.
 fn done(place: &Place, outcome: &Outcome) -> (u64, f64) {
     assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    let found = summary(place);
+    let found = place.summary();
     let phases = found["phases"].as_array().unwrap();
     assert_eq!(phases.last().unwrap()["increments"], 50);
     let iterations = phases
@@ -115,25 +115,19 @@ fn hypoplastic_sand_goes_through_the_chamber_whatever_its_tangent() {
     assert!(!said.contains(NOTICED), "{said}");
     // L: differences take over.
     let (iterations, load, said) = run(0, "");
-    assert!(
-        (load - expected).abs() <= SAME * expected,
-        "{load} {expected}"
-    );
+    near(load, expected, SAME * expected);
     assert_eq!(said.matches(NOTICED).count(), 1, "{said}");
     assert!(said.contains(REPLACED), "{said}");
-    assert!(summary(&place)["warnings"].to_string().contains(REPLACED));
+    assert!(place.summary()["warnings"].to_string().contains(REPLACED));
     assert!(2 * iterations <= 3 * few, "{iterations} {few}");
     // L + N D/|D| is near enough to be kept.
     let (_, load, said) = run(1, "");
-    assert!(
-        (load - expected).abs() <= SAME * expected,
-        "{load} {expected}"
-    );
+    near(load, expected, SAME * expected);
     assert!(!said.contains(REPLACED), "{said}");
     // Whoever wants L gets it, and pays.
     let outcome = place.run_case(sand(0) + "\n[solver]\ntangents = \"law\"\n");
-    assert!(!outcome.says(NOTICED), "{}", outcome.stderr);
-    let phases = summary(&place)["phases"].as_array().unwrap().clone();
+    outcome.hides(NOTICED);
+    let phases = place.summary()["phases"].as_array().unwrap().clone();
     let own: u64 = phases
         .iter()
         .map(|phase| phase["iterations"].as_u64().unwrap())
@@ -170,7 +164,7 @@ fn a_mohr_coulomb_routine_with_a_wrong_tangent_is_noticed_and_gives_the_same_loa
     };
     let exact = [true, false].map(|is_coarse| {
         let outcome = place.run_case(soil(ROUTINE, is_coarse));
-        assert!(!outcome.says(NOTICED), "{}", outcome.stderr);
+        outcome.hides(NOTICED);
         done(&place, &outcome)
     });
     println!("exact: {exact:?}");
@@ -203,7 +197,7 @@ fn consistent_tangents_are_never_called_wrong() {
     let place = Place::new();
     let outcome = place.run_case(soil("law = \"mohr_coulomb\"", false));
     done(&place, &outcome);
-    assert!(!outcome.says("derivative"), "{}", outcome.stderr);
+    outcome.hides("derivative");
     let cases = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../cases");
     for name in [
         "chamber_instability",
@@ -223,7 +217,7 @@ fn a_run_that_is_stopped_before_or_after_the_notice_goes_on_to_the_same_bits() {
         return;
     };
     let outcome = place.run_case(sand(0));
-    assert!(outcome.says(REPLACED), "{}", outcome.stderr);
+    outcome.shows(REPLACED);
     let read = |name: &str| std::fs::read(place.path(name)).unwrap();
     let expected = read("out/history.csv");
     for seconds in ["0.05", "0.15", "0.4"] {
@@ -241,8 +235,7 @@ fn a_run_that_is_stopped_before_or_after_the_notice_goes_on_to_the_same_bits() {
         std::thread::sleep(std::time::Duration::from_secs_f64(seconds.parse().unwrap()));
         child.kill().unwrap();
         child.wait().unwrap();
-        let outcome = place.run(&run);
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        place.done(&run);
         assert!(
             read("stopped/history.csv") == expected,
             "stopped after {seconds} s"

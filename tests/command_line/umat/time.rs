@@ -3,11 +3,11 @@
 //! The routine is a Maxwell body by backward Euler: with τ the relaxation time, a strain that is held
 //! for T in n increments leaves σ₀ (1 + T/(n τ))⁻ⁿ, which tends to σ₀ e^(−T/τ).
 
-use super::tolerance::summary;
-use super::{BAD_INPUT, DONE, Place, number, place, rows, soil};
+use super::{Place, number, place, rows, soil};
 use crate::program::{Edit, edited};
 use std::time::{Duration, Instant};
 use tests::case::table;
+use tests::tolerance::near;
 
 const TAU: f64 = 1000.0;
 
@@ -41,10 +41,7 @@ fn a_strain_that_is_held_relaxes_as_backward_euler_has_it() {
     for n in [10, 100, 1000, 2000] {
         let found = relaxed(&place, n);
         let euler = start * (1.0 + 3000.0 / (n as f64 * TAU)).powi(-(n as i32));
-        assert!(
-            (found - euler).abs() < 1e-9 * euler.abs(),
-            "{n}: {found} {euler}"
-        );
+        near(found, euler, 1e-9 * euler.abs());
         errors.push((found - exact).abs());
     }
     // Of first order: twice the increments, half the error, with the next term T/(n τ) of it.
@@ -105,7 +102,7 @@ fn time_and_dtime_are_those_of_the_segment() {
     }
     let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
     let said = "law `umat_maxwell` depends on the time, and segment 3 says none";
-    assert!(outcome.says(said), "{}", outcome.stderr);
+    outcome.shows(said);
     // A driver without any has the columns that it always had.
     let start = text.find("time = 1e-6").unwrap();
     let untimed = text[..start].to_owned() + "control = { 22 = { strain = -1e-3 } }\n";
@@ -199,9 +196,8 @@ fn a_phase_gives_its_time_to_its_increments() {
     let Some(place) = place("maxwell") else {
         return;
     };
-    let outcome = place.run_case(held("", "increments = 6\ntime = 3000.0"));
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(!outcome.says("depends on the time"), "{}", outcome.stderr);
+    let outcome = place.done_case(held("", "increments = 6\ntime = 3000.0"));
+    outcome.hides("depends on the time");
     let rows = table(&place.path("out/history.csv"));
     assert_eq!(rows.len(), 10);
     let near = |found: f64, expected: f64, what: &str| {
@@ -233,14 +229,13 @@ fn a_phase_that_is_cut_shares_its_time() {
     let Some(place) = place("maxwell") else {
         return;
     };
-    let outcome = place.run_case(held(", longest = 130.0", "increments = 6\ntime = 3000.0"));
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done_case(held(", longest = 130.0", "increments = 6\ntime = 3000.0"));
     let rows = table(&place.path("out/history.csv"));
     let end = rows.last().unwrap();
     let passed = number(end, "passed");
     assert!((passed - 3002.0).abs() < 1e-6, "{passed}");
     assert!(number(end, "dtime") <= 130.0);
-    let cut = summary(&place)["phases"][1]["cut_backs"].as_u64().unwrap();
+    let cut = place.summary()["phases"][1]["cut_backs"].as_u64().unwrap();
     assert!(cut > 0);
     // 500 s in four steps of 125 s, or more that are shorter.
     let (coarse, fine) = (in_theory(24, 3000.0), in_theory(100_000, 3000.0));
@@ -273,24 +268,17 @@ fn a_run_that_is_killed_goes_on_in_time() {
     assert!(rows_now() < 405, "it was not killed on its way");
     let mut resumed = arguments.to_vec();
     resumed.push("--resume");
-    let outcome = place.run(&resumed);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    place.done(&resumed);
     let rows = table(&place.path("out/history.csv"));
     assert_eq!(rows.len(), 404);
     let times: Vec<f64> = rows[4..].iter().map(|row| number(row, "time")).collect();
     for (k, time) in (1..).zip(times) {
         let expected = 2.0 + 7.5 * f64::from(k);
-        assert!(
-            (time - expected).abs() < 1e-9 * expected,
-            "{time} {expected}"
-        );
+        near(time, expected, 1e-9 * expected);
     }
     let found = number(rows.last().unwrap(), "stress");
     let expected = in_theory(400, 3000.0);
-    assert!(
-        (found - expected).abs() < 1e-8 * expected.abs(),
-        "{found} {expected}"
-    );
+    near(found, expected, 1e-8 * expected.abs());
 }
 
 #[test]
@@ -298,24 +286,17 @@ fn a_phase_without_a_time_is_told_of() {
     let Some(place) = place("maxwell") else {
         return;
     };
-    let outcome = place.run_case(held("", "increments = 2"));
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = place.done_case(held("", "increments = 2"));
     let said = "phase `hold` has no `time`, and law `soil` depends on time: the phase takes 1 unit of time";
-    assert!(outcome.says(said), "{}", outcome.stderr);
-    assert!(
-        !outcome.says("phase `push` has no `time`"),
-        "{}",
-        outcome.stderr
-    );
+    outcome.shows(said).hides("phase `push` has no `time`");
     let rows = table(&place.path("out/history.csv"));
     assert_eq!(number(rows.last().unwrap(), "time"), 3.0);
     // A routine that says nothing of the time is not asked about it.
     let Some(elastic) = super::place("elastic") else {
         return;
     };
-    let outcome = elastic.run_case(soil("elastic", ""));
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(!outcome.says("depends on the time"), "{}", outcome.stderr);
+    let outcome = elastic.done_case(soil("elastic", ""));
+    outcome.hides("depends on the time");
 }
 
 #[test]
@@ -340,16 +321,14 @@ fn times_that_cannot_be_are_refused_at_their_place() {
             "driver.toml",
             driver(&format!("increments = 2\ntime = {time}\ncontrol = {{}}")),
         );
-        let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
-        assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+        let outcome = place.refused(&["point", "driver.toml", "--csv", "out.csv"]);
         assert!(outcome.says(said), "{time}: {}", outcome.stderr);
         assert!(
             outcome.says("driver.toml:12:8"),
             "{time}: {}",
             outcome.stderr
         );
-        let outcome = place.run_case(held("", &format!("increments = 2\ntime = {time}")));
-        assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
+        let outcome = place.refused_case(held("", &format!("increments = 2\ntime = {time}")));
         assert!(outcome.says(said), "{time}: {}", outcome.stderr);
         assert!(
             outcome.says(&format!("time = {time}")),

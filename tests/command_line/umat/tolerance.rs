@@ -14,19 +14,13 @@ fn point(place: &Place, text: &str) -> Outcome {
     place.run(&["point", "driver.toml", "--csv", "out.csv"])
 }
 
-pub(super) fn summary(place: &Place) -> serde_json::Value {
-    let text = std::fs::read_to_string(place.path("out/summary.json")).unwrap();
-    serde_json::from_str(&text).unwrap()
-}
-
 #[test]
 fn copies_may_be_used_up_and_that_is_noted_once() {
     let Some(place) = place("habits") else {
         return;
     };
     let stress = |what: f64| {
-        let outcome = point(&place, &driver("habits", "", &format!("what = {what}")));
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        let outcome = point(&place, &driver("habits", "", &format!("what = {what}"))).ended(DONE);
         let rows = table(&place.path("out.csv"));
         let end = rows.last().unwrap();
         let stress = ["11", "22", "33", "12"].map(|c| number(end, &format!("stress_{c}")));
@@ -43,8 +37,7 @@ fn copies_may_be_used_up_and_that_is_noted_once() {
     ] {
         for keys in ["", "in_process = true"] {
             let text = driver("habits", keys, &format!("what = {what}"));
-            let outcome = point(&place, &text);
-            assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+            let outcome = point(&place, &text).ended(DONE);
             let said = &outcome.stderr;
             assert_eq!(
                 said.matches("law `umat_habits`: the routine").count(),
@@ -61,15 +54,14 @@ fn copies_may_be_used_up_and_that_is_noted_once() {
         "poisson_ratio = 0.3, what = 1 }",
         1,
     );
-    let outcome = place.run_case(case);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    let warnings = summary(&place)["warnings"].to_string();
+    let outcome = place.done_case(case);
+    let warnings = place.summary()["warnings"].to_string();
     assert_eq!(
         warnings.matches("overwrites DSTRAN, which").count(),
         1,
         "{warnings}"
     );
-    assert!(outcome.says("warning: law `umat_habits`: the routine overwrites DSTRAN"));
+    outcome.shows("warning: law `umat_habits`: the routine overwrites DSTRAN");
 }
 
 #[test]
@@ -88,8 +80,7 @@ fn time_increments_are_positive_in_every_call() {
     // The elastic operator is asked for, and is that of a call without strain.
     for method in ["newton", "initial_stress"] {
         let text = text.replacen("[solver]", &format!("[solver]\nmethod = \"{method}\""), 1);
-        let outcome = place.run_case(text);
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        place.done_case(text);
     }
 }
 
@@ -105,20 +96,14 @@ fn what_is_printed_is_passed_on_and_counted() {
     };
     // Little: all of it, and nothing in the table on the standard output.
     place.write("driver.toml", driver("talks", "", "lines = 0"));
-    let outcome = place.run(&["point", "driver.toml"]);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = place.done(&["point", "driver.toml"]);
     let here = place.path("").canonicalize().unwrap();
     let outdir = format!("law `umat_talks` prints:  OUTDIR IS {}", here.display());
-    assert!(
-        outcome.says(outdir.trim_end_matches('/')),
-        "{}",
-        outcome.stderr
-    );
+    outcome.shows(outdir.trim_end_matches('/'));
     assert!(!outcome.stdout.contains("OUTDIR"), "{}", outcome.stdout);
     // Much: the first lines, and how many there were. 3 a call, 10 increments and the start.
     let text = driver("talks", "", "lines = 3");
-    let outcome = point(&place, &text);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = point(&place, &text).ended(DONE);
     assert_eq!(
         lines(&outcome.stderr, "umat_talks` prints: ").len(),
         20,
@@ -142,8 +127,7 @@ fn what_is_printed_is_passed_on_and_counted() {
         "poisson_ratio = 0.3, lines = 1 }",
         1,
     );
-    let outcome = place.run_case(case);
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = place.done_case(case);
     assert_eq!(lines(&outcome.stderr, "umat_talks` prints: ").len(), 20);
     assert!(!outcome.stdout.contains("LINE"), "{}", outcome.stdout);
 }
@@ -162,8 +146,9 @@ fn scratch_files_are_removed_or_kept() {
     let run = |keys: &str| {
         place.write("driver.toml", driver("talks", keys, "lines = 0"));
         let arguments = ["point", "driver.toml", "--csv", "out.csv"];
-        let outcome = place.run_with(&arguments, &[("TMPDIR", scratch.to_str().unwrap())]);
-        assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+        let outcome = place
+            .run_with(&arguments, &[("TMPDIR", scratch.to_str().unwrap())])
+            .ended(DONE);
         for name in ["fort.7", "notes.dat"] {
             assert!(!place.path(name).exists(), "{name} beside the driver");
         }
@@ -176,7 +161,7 @@ fn scratch_files_are_removed_or_kept() {
         panic!("{:?}", left())
     };
     let says = format!("scratch files of law `umat_talks` in {}", folder.display());
-    assert!(outcome.says(&says), "{says}\n{}", outcome.stderr);
+    outcome.shows(&says);
     // Ten increments and the start, to the last line.
     let text = std::fs::read_to_string(folder.join("worker_1/fort.7")).unwrap();
     assert!(text.lines().count() >= 11, "{text}");
@@ -187,7 +172,7 @@ fn scratch_files_are_removed_or_kept() {
     assert!(folder.join("worker_1/notes.dat").is_file());
     // The sidecar may say it, for the IncrementalDriver, whose input has no such key.
     std::fs::remove_dir_all(folder).unwrap();
-    let sidecar = std::fs::read_to_string(place.path("talks.law.toml")).unwrap();
+    let sidecar = place.read("talks.law.toml");
     place.write("talks.law.toml", format!("scratch = \"keep\"\n{sidecar}"));
     run("");
     assert_eq!(left().len(), 1);
@@ -208,9 +193,8 @@ fn scratch_files_are_removed_or_kept() {
             "`externals`: there is no `ignore`",
         ),
     ] {
-        let outcome = point(&place, &driver("talks", keys, "lines = 0"));
-        assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-        assert!(outcome.says(says), "{says}\n{}", outcome.stderr);
+        let outcome = point(&place, &driver("talks", keys, "lines = 0")).ended(BAD_INPUT);
+        outcome.shows(says);
     }
 }
 
@@ -221,11 +205,8 @@ fn what_nobody_supplies_is_named_at_once_or_trapped() {
     };
     let names = "linked with nor Pilum supply: `getvrm_`, `mutexlock_`.";
     for keys in ["", "in_process = true"] {
-        let outcome = point(&place, &driver("externals", keys, ""));
-        assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
-        for text in [names, "`externals = \"trap\"`"] {
-            assert!(outcome.says(text), "{text}\n{}", outcome.stderr);
-        }
+        let outcome = point(&place, &driver("externals", keys, "")).ended(PLUGIN_TROUBLE);
+        outcome.shows(names).shows("`externals = \"trap\"`");
     }
     let trap = "externals = \"trap\"";
     let bound = ["-shared", "-fPIC", "-Wl,-z,now,-z,relro"];
@@ -247,18 +228,16 @@ fn what_nobody_supplies_is_named_at_once_or_trapped() {
             );
         }
         // One that is called ends the increment and is named.
-        let outcome = point(&place, &driver("externals", trap, "limit = 1.1e-3"));
-        assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
-        for text in [
-            "segment 1, increment 7 of 10",
-            "exit code 71",
-            "calls `mutexlock_`, which nobody supplies",
-        ] {
-            assert!(outcome.says(text), "{text}\n{}", outcome.stderr);
-        }
-        let outcome = place.run(&["replay", "out.failure.toml"]);
-        assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
-        assert!(outcome.stdout.contains("as recorded"), "{}", outcome.stdout);
+        let outcome =
+            point(&place, &driver("externals", trap, "limit = 1.1e-3")).ended(PLUGIN_TROUBLE);
+        outcome
+            .shows("segment 1, increment 7 of 10")
+            .shows("exit code 71")
+            .shows("calls `mutexlock_`, which nobody supplies");
+        let outcome = place
+            .run(&["replay", "out.failure.toml"])
+            .ended(PLUGIN_TROUBLE);
+        outcome.prints("as recorded");
     }
 }
 
@@ -276,17 +255,13 @@ fn no_trap_stands_for_data() {
     std::fs::remove_file(&library).unwrap();
     let sources = [source("externals.f"), place.path("data.c")];
     gfortran(&["-shared", "-fPIC"], &sources, &library).unwrap();
-    let outcome = point(&place, &driver("externals", "externals = \"trap\"", ""));
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
-    assert!(
-        outcome.says("no trap can stand for: `table_`"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome =
+        point(&place, &driver("externals", "externals = \"trap\"", "")).ended(PLUGIN_TROUBLE);
+    outcome.shows("no trap can stand for: `table_`");
     let outcome = point(&place, &driver("externals", "", ""));
-    for text in ["`getvrm_`, `mutexlock_`, `other_`", "`table_`"] {
-        assert!(outcome.says(text), "{text}\n{}", outcome.stderr);
-    }
+    outcome
+        .shows("`getvrm_`, `mutexlock_`, `other_`")
+        .shows("`table_`");
 }
 
 #[test]
@@ -307,7 +282,7 @@ fn a_tangent_may_stand_row_by_row() {
     // ε₂₂ = σ₂₂/K, ε₁₁ = (σ₁₁ − C ε₂₂)/K.
     assert!((number(end, "strain_22") + 20.0 / 1e4).abs() < 1e-14);
     assert!((number(end, "strain_11") - (30.0 + 8e3 * 20.0 / 1e4) / 1e4).abs() < 1e-14);
-    let sidecar = std::fs::read_to_string(place.path("rows.law.toml")).unwrap();
+    let sidecar = place.read("rows.law.toml");
     let columns = sidecar.replacen("\"rows\"", "\"columns\"", 1);
     assert_ne!(columns, sidecar);
     place.write("rows.law.toml", columns);
@@ -316,13 +291,8 @@ fn a_tangent_may_stand_row_by_row() {
     assert!(by_rows <= 6.0, "one correction of a linear law: {by_rows}");
     assert!(by_columns > by_rows, "{by_columns} {by_rows}");
     place.write("rows.law.toml", sidecar.replacen("\"rows\"", "\"c\"", 1));
-    let outcome = point(&place, text);
-    assert_eq!(outcome.code, Some(BAD_INPUT), "{}", outcome.stderr);
-    assert!(
-        outcome.says("`tangent_order`: there is no `c`"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = point(&place, text).ended(BAD_INPUT);
+    outcome.shows("`tangent_order`: there is no `c`");
 }
 
 /// The cone with elastic tangents, in a soil that flows.
@@ -359,48 +329,36 @@ fn an_approximate_tangent_is_replaced_by_differences() {
     let sidecar = std::fs::read_to_string(source("elastic_tangent.law.toml")).unwrap();
     place.write("elastic_tangent.law.toml", &sidecar);
     let total = |place: &Place| -> u64 {
-        let found = summary(place);
+        let found = place.summary();
         let phases = found["phases"].as_array().unwrap().iter();
         phases
             .map(|phase| phase["iterations"].as_u64().unwrap())
             .sum()
     };
-    let outcome = flowing(&place, "");
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
+    let outcome = flowing(&place, "").ended(DONE);
     let says = "law `umat_elastic_tangent` declares its tangents approximate: differences of its stresses \
                 replace them";
     let said = outcome.stderr.matches(says).count();
     assert_eq!(said, 1, "{}", outcome.stderr);
     let declared = total(&place);
     // Methods that do without exact tangents are left alone.
-    let outcome = flowing(&place, "method = \"quasi_newton\"");
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(!outcome.says("differences"), "{}", outcome.stderr);
+    let outcome = flowing(&place, "method = \"quasi_newton\"").ended(DONE);
+    outcome.hides("differences");
     let quasi = total(&place);
     // Without the word it is noticed.
     place.write(
         "elastic_tangent.law.toml",
         sidecar.replacen("tangent = \"approximate\"", "", 1),
     );
-    let outcome = flowing(&place, "");
-    assert_eq!(outcome.code, Some(DONE), "{}", outcome.stderr);
-    assert!(
-        outcome.says("from here on they are made by differences"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = flowing(&place, "").ended(DONE);
+    outcome.shows("from here on they are made by differences");
     let noticed = total(&place);
     println!("declared {declared}, noticed {noticed}, quasi-Newton {quasi}");
     assert!(2 * declared < quasi, "{declared} {quasi}");
     assert!(noticed < quasi, "{noticed} {quasi}");
     // With the law's own it fails, and the message says why.
-    let outcome = flowing(&place, "tangents = \"law\"");
-    assert_eq!(outcome.code, Some(NO_EQUILIBRIUM), "{}", outcome.stderr);
-    assert!(
-        outcome.says("the tangent of the law differs"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = flowing(&place, "tangents = \"law\"").ended(NO_EQUILIBRIUM);
+    outcome.shows("the tangent of the law differs");
 }
 
 /// That gfortran's own libraries are there is no reason to believe that a name is.
@@ -424,7 +382,7 @@ fn a_library_that_needs_a_missing_library_is_refused_for_that() {
         .unwrap();
     assert!(status.success());
     std::fs::remove_file(needed).unwrap();
-    let outcome = point(&place, &driver("externals", "externals = \"trap\"", ""));
-    assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{}", outcome.stderr);
-    assert!(outcome.says("libneeded.so"), "{}", outcome.stderr);
+    let outcome =
+        point(&place, &driver("externals", "externals = \"trap\"", "")).ended(PLUGIN_TROUBLE);
+    outcome.shows("libneeded.so");
 }

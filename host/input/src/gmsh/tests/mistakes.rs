@@ -2,124 +2,71 @@
 
 use super::*;
 
-/// The defect, a part of a file with its replacement, and the error.
-type Mistake = (&'static str, &'static str, &'static str, &'static str);
-
-const MISTAKES: [Mistake; 18] = [
-    (
-        "another format",
-        "2.2 0 8",
-        "3.0 0 8",
-        "line 2: the format has version 3; 4.1, 4.0 and 2.0 to 2.2 are read: `gmsh old.msh -save",
-    ),
-    (
-        "short numbers",
-        "2.2 0 8",
-        "2.2 0 4",
-        "line 2: numbers of 4 bytes",
-    ),
-    (
-        "no numbers",
-        "2.2 0 8",
-        "2.2 0 eight",
-        "line 2: expected the size of numbers, found `eight`",
-    ),
-    (
-        "not a mesh",
-        "$MeshFormat",
-        "MeshFormat",
-        "line 1: a mesh file of Gmsh begins with",
-    ),
-    (
-        "a wrong end",
-        "$EndNodes",
-        "$EndKnots",
-        "expected `$EndNodes`, found `$EndKnots`",
-    ),
-    (
-        "more nodes than said",
-        "\n15\n10 0",
-        "\n14\n10 0",
-        "expected `$EndNodes`, found `150 5 5 0`",
-    ),
-    (
-        "far more nodes",
-        "\n15\n10 0",
-        "\n999999999999999\n10 0",
-        "more than the rest of the file",
-    ),
-    (
-        "a node twice",
-        "\n20 1 0 0",
-        "\n10 1 0 0",
-        "line 16: node 10 comes twice",
-    ),
-    (
-        "no number",
-        "\n20 1 0 0",
-        "\n20 nan 0 0",
-        "line 16: a coordinate of node 20 is NaN",
-    ),
-    (
-        "off the plane",
-        "\n20 1 0 0",
-        "\n20 1 0 0.5",
-        "line 16: node 20 is at z = 0.5: the mesh does",
-    ),
-    (
-        "a missing node",
-        "\n50 2 0 0",
-        "\n51 2 0 0",
-        "has the node 50, which is not among the nodes",
-    ),
-    (
-        "third order",
-        "7 16 2",
-        "7 36 2",
-        "line 39: an element of type 36 is a quad of higher order; a mesh has triangles, quads, lines",
-    ),
-    (
-        "a solid",
-        "7 16 2",
-        "7 11 2",
-        "line 39: an element of type 11 is a tetrahedron",
-    ),
-    (
-        "a node twice in an element",
-        "20 50 60 110 120 140",
-        "20 50 50 110 120 140",
-        "line 40: element 8 has the node 50 twice",
-    ),
-    (
-        "an element twice",
-        "9 9 2 2 2 20 30 60 80 130 140",
-        "9 9 2 2 2 20 50 60 110 120 140",
-        "line 41: elements 8 and 9 have the same nodes",
-    ),
-    (
-        "a middle that is a corner",
-        "10 20 30 40 70 80 90 100",
-        "10 20 80 40 70 30 90 100",
-        "line 39: the middle of a side of element 7 is a corner",
-    ),
-    (
-        "a curve beside the elements",
-        "3 8 2 1 1 20 50 110",
-        "3 8 2 1 1 20 60 110",
-        "line 35: element 3 of the physical curve `bottom` is no side",
-    ),
-    (
-        "a section twice",
-        "$PhysicalNames",
-        "$Nodes\n0\n$EndNodes\n$PhysicalNames",
-        "section `$Nodes` comes twice",
-    ),
-];
+/// The defect; a part of a file with its replacement, `\n` for the end of a line; the error.
+const MISTAKES: &str = r"
+another format
+  2.2 0 8 => 3.0 0 8
+  line 2: the format has version 3; 4.1, 4.0 and 2.0 to 2.2 are read: `gmsh old.msh -save
+short numbers
+  2.2 0 8 => 2.2 0 4
+  line 2: numbers of 4 bytes
+no numbers
+  2.2 0 8 => 2.2 0 eight
+  line 2: expected the size of numbers, found `eight`
+not a mesh
+  $MeshFormat => MeshFormat
+  line 1: a mesh file of Gmsh begins with
+a wrong end
+  $EndNodes => $EndKnots
+  expected `$EndNodes`, found `$EndKnots`
+more nodes than said
+  \n15\n10 0 => \n14\n10 0
+  expected `$EndNodes`, found `150 5 5 0`
+far more nodes
+  \n15\n10 0 => \n999999999999999\n10 0
+  more than the rest of the file
+a node twice
+  \n20 1 0 0 => \n10 1 0 0
+  line 16: node 10 comes twice
+no number
+  \n20 1 0 0 => \n20 nan 0 0
+  line 16: a coordinate of node 20 is NaN
+off the plane
+  \n20 1 0 0 => \n20 1 0 0.5
+  line 16: node 20 is at z = 0.5: the mesh does
+a missing node
+  \n50 2 0 0 => \n51 2 0 0
+  has the node 50, which is not among the nodes
+third order
+  7 16 2 => 7 36 2
+  line 39: an element of type 36 is a quad of higher order; a mesh has triangles, quads, lines
+a solid
+  7 16 2 => 7 11 2
+  line 39: an element of type 11 is a tetrahedron
+a node twice in an element
+  20 50 60 110 120 140 => 20 50 50 110 120 140
+  line 40: element 8 has the node 50 twice
+an element twice
+  9 9 2 2 2 20 30 60 80 130 140 => 9 9 2 2 2 20 50 60 110 120 140
+  line 41: elements 8 and 9 have the same nodes
+a middle that is a corner
+  10 20 30 40 70 80 90 100 => 10 20 80 40 70 30 90 100
+  line 39: the middle of a side of element 7 is a corner
+a curve beside the elements
+  3 8 2 1 1 20 50 110 => 3 8 2 1 1 20 60 110
+  line 35: element 3 of the physical curve `bottom` is no side
+a section twice
+  $PhysicalNames => $Nodes\n0\n$EndNodes\n$PhysicalNames
+  section `$Nodes` comes twice
+";
 
 #[test]
 fn mistakes_in_text_files_are_told_with_their_line() {
     let text = String::from_utf8(model().write(2.2, Bytes::Text)).unwrap();
-    for (what, old, new, says) in MISTAKES {
+    let rows: Vec<&str> = MISTAKES.lines().skip(1).map(str::trim).collect();
+    for row in rows.chunks(3) {
+        let (what, edit, says) = (row[0], row[1].replace("\\n", "\n"), row[2]);
+        let (old, new) = edit.split_once(" => ").unwrap();
         assert_eq!(text.matches(old).count(), 1, "{what}: {old}");
         let broken = text.replacen(old, new, 1);
         let why = read(broken.as_bytes(), &all()).unwrap_err();
