@@ -216,7 +216,7 @@ impl Soil {
         }
         let mut is_guess = zone.merged != base;
         let hardening = self.cap.hardening(self, trial.p_p);
-        let mut may_harden = true;
+        let (mut may_harden, mut failures) = (true, 0);
         for _ in 0..MAX_ZONES {
             let system = System::new(self, trial, zone, hardening);
             let Some(end) = solve(&system, multipliers, size, trial.tolerance) else {
@@ -224,11 +224,17 @@ impl Soil {
                     multipliers = [0.0; 2];
                     continue;
                 }
-                if zone.cap && zone.shear != Shear::None {
-                    zone = zone.without_cap();
-                    continue;
+                if !zone.cap || zone.shear == Shear::None {
+                    return None;
                 }
-                return None;
+                // Either of them may be the way to both, or enough.
+                failures += 1;
+                match failures {
+                    1 => zone = zone.without_cap(),
+                    2 => zone.shear = Shear::None,
+                    _ => return None,
+                }
+                continue;
             };
             multipliers = end.multipliers.map(|x| x.max(0.0));
             if mem::take(&mut is_guess) && !system.merges(&end) {
@@ -236,6 +242,9 @@ impl Soil {
                 continue;
             }
             match self.judge(&system, &end, margin, may_harden) {
+                Verdict::Ends(_) if zone.merged != base && !system.merges(&end) => {
+                    zone.merged = base;
+                }
                 Verdict::Ends(gamma) => {
                     return Some(End {
                         zone,
@@ -308,7 +317,10 @@ impl Soil {
         let (zone, trial) = (system.zone, &system.trial);
         let s = &end.s;
         let [Lambda, mu] = end.multipliers;
-        if zone.shear != Shear::None && Lambda < 0.0 {
+        // Stress that the multipliers take away, kPa.
+        let stiffness = self.G * trial.E;
+        let along_cap = end.middle[0].abs().max(end.middle[1].abs());
+        if zone.shear != Shear::None && Lambda * stiffness < -margin {
             return Verdict::Other(Zone {
                 shear: Shear::None,
                 ..zone
@@ -320,7 +332,7 @@ impl Soil {
                 ..zone
             });
         }
-        if zone.cap && mu < 0.0 {
+        if zone.cap && mu * stiffness * along_cap < -margin {
             return Verdict::Other(zone.without_cap());
         }
         let (over_12, over_23) = (s[1] - s[0], s[2] - s[1]);
@@ -451,12 +463,15 @@ fn solve(
     tolerance: f64,
 ) -> Option<Iterate> {
     const MAX_ITERATIONS: u32 = 30;
+    /// Stress over that of the trial, beyond which the method diverges.
+    const FARTHEST: f64 = 1e3;
     let mut before = 0.0;
     for _ in 0..MAX_ITERATIONS {
         let mut end = system.at(multipliers);
         // A sum: the larger of two numbers would hide one that is none.
         let residual = (end.residual[0].abs() + end.residual[1].abs()) / size;
-        if !(end.s[0] + end.s[1] + end.s[2] + residual).is_finite() {
+        let stress = end.s[0].abs() + end.s[1].abs() + end.s[2].abs();
+        if !(stress + system.taken_by_shear(multipliers[0]) + residual * size < FARTHEST * size) {
             return None;
         }
         if residual <= 1e-15 || (residual <= 1e-12 && residual >= 0.5 * before && before > 0.0) {

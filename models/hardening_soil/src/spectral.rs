@@ -30,7 +30,8 @@ impl<const N: usize> Principal<N> {
     /// Decomposes a tensor, given as stress components.
     #[inline]
     pub(crate) fn of(tensor: &[f64; N]) -> Self {
-        let (values, axes) = if N == 4 {
+        // What lies in a plane of space is decomposed as in the plane, to the last digit.
+        let (values, axes) = if N == 4 || (tensor[4] == 0.0 && tensor[5] == 0.0) {
             in_plane([tensor[0], tensor[1], tensor[2], tensor[3]])
         } else {
             in_space(array::from_fn(|i| tensor[i]))

@@ -164,6 +164,12 @@ impl<'a> System<'a> {
         [h * Lambda, h, 0.0, 0.0]
     }
 
+    /// Size of the stress that flow along the shear surface takes away, kPa.
+    #[inline]
+    pub(crate) fn taken_by_shear(&self, Lambda: f64) -> f64 {
+        (Lambda * self.soil.G * self.trial.E).abs()
+    }
+
     /// Difference of plastic strains that makes stresses equal.
     #[inline]
     fn apart<T: Linear>(&self, difference: T) -> T {
@@ -335,9 +341,9 @@ impl<'a> System<'a> {
         array::from_fn(|i| self.trial.theta * (self.start[i] + of_s[i]))
     }
 
-    /// Whether the cut-off has to hold the stress back at this end.
+    /// What the minor stress, with that merged into it, lacks of the cut-off without flow along its normal, kPa.
     #[inline]
-    pub(crate) fn needs_cut_off(&self, end: &Iterate, margin: f64) -> bool {
+    fn beyond_cut_off(&self, end: &Iterate) -> f64 {
         let Soil { lambda, G, cap, .. } = self.soil;
         let [Lambda, mu] = end.multipliers;
         let shear = self.flow(self.sin_psi());
@@ -352,30 +358,40 @@ impl<'a> System<'a> {
         };
         let E = self.trial.E;
         let free = trial - E * (lambda * (flow[0] + flow[1] + flow[2]) + 2.0 * G * flow[2]);
-        free <= margin - self.soil.R_t
+        -self.soil.R_t - free
+    }
+
+    /// Whether the cut-off has to hold the stress back at this end.
+    #[inline]
+    pub(crate) fn needs_cut_off(&self, end: &Iterate, margin: f64) -> bool {
+        self.beyond_cut_off(end) >= -margin
     }
 
     /// Whether flow on one side of the edge would carry the merged stresses past each other.
     #[inline]
     pub(crate) fn merges(&self, end: &Iterate) -> bool {
+        let Soil { lambda, G, cap, .. } = self.soil;
         let [Lambda, mu] = end.multipliers;
         let t = &self.trial.s;
         let u = self.sin_psi();
-        let side = self.soil.cap.gradient(false, false);
-        let M = self.soil.cap.M;
-        let cap = mu * 2.0 * end.middle[1] / (M * M);
+        let side = cap.gradient(false, false);
+        let along_q = mu * 2.0 * end.middle[1] / (cap.M * cap.M);
         let (gap, closing) = match self.zone.merged {
             Merged::None => return true,
             Merged::First12 => (
                 t[0] - t[1],
-                0.5 * Lambda * (1.0 - u) + cap * (side[0] - side[1]),
+                0.5 * Lambda * (1.0 - u) + along_q * (side[0] - side[1]),
             ),
             Merged::Last23 => (
                 t[1] - t[2],
-                0.5 * Lambda * (1.0 + u) + cap * (side[1] - side[2]),
+                0.5 * Lambda * (1.0 + u) + along_q * (side[1] - side[2]),
             ),
         };
-        gap <= 2.0 * self.soil.G * self.trial.E * closing
+        let mut closed = 2.0 * G * self.trial.E * closing;
+        if self.zone.tension && self.zone.merged == Merged::Last23 {
+            closed += 2.0 * G / (lambda + G) * self.beyond_cut_off(end);
+        }
+        gap <= closed
     }
 
     /// Rates of stress, p_p and γ_ps at the end; the others of the result are those of the start.
