@@ -5,6 +5,7 @@
 
 use crate::rate::{Rate, mean};
 use crate::soil::Soil;
+use crate::step::Point;
 use crate::system::{Iterate, Rates, System};
 use std::mem;
 
@@ -175,13 +176,27 @@ impl Soil {
         }
     }
 
+    /// Whether a trial stress is within all surfaces; those that it most often lies beyond come first.
+    #[inline]
+    fn is_within(&self, trial: &Trial, margin: f64) -> bool {
+        let s = &trial.s;
+        self.beyond_cap(s, trial.p_p) <= margin
+            && self.beyond_limit(s) <= margin
+            && !self.is_beyond_cut_off(s, margin)
+            && self.beyond_shear(s, trial.gamma) <= margin
+    }
+
     /// Returns a trial stress, Eq. (15). None if the iterations fail: then a smaller step may not.
     /// `guess` are zone and multipliers of a return from nearby.
     #[inline]
     pub(crate) fn return_stress(&self, trial: Trial, guess: Option<&End<'_>>) -> Option<End<'_>> {
         let size = self.size(&trial.s);
         let margin = MARGIN * size;
-        let mut zone = self.violated(&trial, margin);
+        let guess = guess.and_then(|end| Some((end.zone, end.solved.as_ref()?)));
+        let mut zone = match &guess {
+            Some((zone, _)) if !self.is_within(&trial, margin) => *zone,
+            _ => self.violated(&trial, margin),
+        };
         if zone.is_elastic() {
             return Some(End {
                 zone,
@@ -199,20 +214,15 @@ impl Soil {
         } else {
             Merged::None
         };
-        zone.merged = if zone.shear == Shear::None && !zone.cap {
-            Merged::None
-        } else {
-            base
-        };
         let mut multipliers = [0.0; 2];
-        if let Some((guess, iterate)) = guess.and_then(|end| end.solved.as_ref()) {
-            (zone, multipliers) = (guess.zone, iterate.multipliers);
-        } else if trial.guesses
-            && zone.merged == Merged::None
-            && (zone.shear != Shear::None || zone.cap)
-        {
-            // What was on an edge mostly stays there.
-            zone.merged = self.edge(&trial.start);
+        if let Some((_, (_, iterate))) = guess {
+            multipliers = iterate.multipliers;
+        } else if zone.shear != Shear::None || zone.cap {
+            zone.merged = base;
+            if trial.guesses && base == Merged::None {
+                // What was on an edge mostly stays there.
+                zone.merged = self.edge(&trial.start);
+            }
         }
         let mut is_guess = zone.merged != base;
         let hardening = self.cap.hardening(self, trial.p_p);
@@ -400,14 +410,22 @@ impl Soil {
 impl End<'_> {
     /// Rates of an end, from the rates of what it depends on; those of p_p and γ_ps if they are asked for.
     #[inline]
-    pub(crate) fn rates<const N: usize>(&self, of: &Rates<N>, with_variables: bool) -> Rates<N> {
+    pub(crate) fn rates<const N: usize>(
+        &self,
+        of: &Rates<N>,
+        with_variables: bool,
+    ) -> Point<3, Rate<N>> {
         match &self.solved {
             Some((system, iterate)) => system.rates(iterate, of, with_variables),
-            None if self.zone.corner => Rates {
-                s: [Rate::ZERO; 3],
-                ..*of
+            None => Point {
+                stress: if self.zone.corner {
+                    [Rate::ZERO; 3]
+                } else {
+                    of.s
+                },
+                p_p: of.p_p,
+                gamma: of.gamma,
             },
-            None => *of,
         }
     }
 

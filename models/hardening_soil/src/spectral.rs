@@ -1,7 +1,7 @@
 //! Principal values and axes of a symmetric tensor in the plane (11 22 33 12) and in space
 //! (11 22 33 12 13 23).
 
-use crate::rate::Linear;
+use crate::rate::{Linear, Rate};
 use std::array;
 
 /// Row and column of a component.
@@ -82,6 +82,12 @@ impl<const N: usize> Principal<N> {
 }
 
 impl<const N: usize> Turn<N> {
+    /// Rate of a component of the strain in the axes.
+    #[inline]
+    pub(crate) fn strain(&self, row: usize) -> Rate<N> {
+        Rate(self.rows[row])
+    }
+
     /// A stress in the axes: normal components, then shear components.
     #[inline]
     pub(crate) fn stress<T: Linear>(&self, stress: &[T; N]) -> [T; N] {
