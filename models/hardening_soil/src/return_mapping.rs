@@ -5,6 +5,7 @@
 
 use crate::rate::{Rate, mean};
 use crate::soil::Soil;
+use crate::step::Point;
 use crate::system::{Iterate, Rates, System};
 use std::mem;
 
@@ -175,13 +176,27 @@ impl Soil {
         }
     }
 
+    /// Whether a trial stress is within all surfaces; those that it most often lies beyond come first.
+    #[inline]
+    fn is_within(&self, trial: &Trial, margin: f64) -> bool {
+        let s = &trial.s;
+        self.beyond_cap(s, trial.p_p) <= margin
+            && self.beyond_limit(s) <= margin
+            && !self.is_beyond_cut_off(s, margin)
+            && self.beyond_shear(s, trial.gamma) <= margin
+    }
+
     /// Returns a trial stress, Eq. (15). None if the iterations fail: then a smaller step may not.
     /// `guess` are zone and multipliers of a return from nearby.
     #[inline]
     pub(crate) fn return_stress(&self, trial: Trial, guess: Option<&End<'_>>) -> Option<End<'_>> {
         let size = self.size(&trial.s);
         let margin = MARGIN * size;
-        let mut zone = self.violated(&trial, margin);
+        let guess = guess.and_then(|end| Some((end.zone, end.solved.as_ref()?)));
+        let mut zone = match &guess {
+            Some((zone, _)) if !self.is_within(&trial, margin) => *zone,
+            _ => self.violated(&trial, margin),
+        };
         if zone.is_elastic() {
             return Some(End {
                 zone,
@@ -199,24 +214,19 @@ impl Soil {
         } else {
             Merged::None
         };
-        zone.merged = if zone.shear == Shear::None && !zone.cap {
-            Merged::None
-        } else {
-            base
-        };
         let mut multipliers = [0.0; 2];
-        if let Some((guess, iterate)) = guess.and_then(|end| end.solved.as_ref()) {
-            (zone, multipliers) = (guess.zone, iterate.multipliers);
-        } else if trial.guesses
-            && zone.merged == Merged::None
-            && (zone.shear != Shear::None || zone.cap)
-        {
-            // What was on an edge mostly stays there.
-            zone.merged = self.edge(&trial.start);
+        if let Some((_, (_, iterate))) = guess {
+            multipliers = iterate.multipliers;
+        } else if zone.shear != Shear::None || zone.cap {
+            zone.merged = base;
+            if trial.guesses && base == Merged::None {
+                // What was on an edge mostly stays there.
+                zone.merged = self.edge(&trial.start);
+            }
         }
         let mut is_guess = zone.merged != base;
         let hardening = self.cap.hardening(self, trial.p_p);
-        let mut may_harden = true;
+        let (mut may_harden, mut failures) = (true, 0);
         for _ in 0..MAX_ZONES {
             let system = System::new(self, trial, zone, hardening);
             let Some(end) = solve(&system, multipliers, size, trial.tolerance) else {
@@ -224,11 +234,17 @@ impl Soil {
                     multipliers = [0.0; 2];
                     continue;
                 }
-                if zone.cap && zone.shear != Shear::None {
-                    zone = zone.without_cap();
-                    continue;
+                if !zone.cap || zone.shear == Shear::None {
+                    return None;
                 }
-                return None;
+                // Either of them may be the way to both, or enough.
+                failures += 1;
+                match failures {
+                    1 => zone = zone.without_cap(),
+                    2 => zone.shear = Shear::None,
+                    _ => return None,
+                }
+                continue;
             };
             multipliers = end.multipliers.map(|x| x.max(0.0));
             if mem::take(&mut is_guess) && !system.merges(&end) {
@@ -236,6 +252,9 @@ impl Soil {
                 continue;
             }
             match self.judge(&system, &end, margin, may_harden) {
+                Verdict::Ends(_) if zone.merged != base && !system.merges(&end) => {
+                    zone.merged = base;
+                }
                 Verdict::Ends(gamma) => {
                     return Some(End {
                         zone,
@@ -308,7 +327,10 @@ impl Soil {
         let (zone, trial) = (system.zone, &system.trial);
         let s = &end.s;
         let [Lambda, mu] = end.multipliers;
-        if zone.shear != Shear::None && Lambda < 0.0 {
+        // Stress that the multipliers take away, kPa.
+        let stiffness = self.G * trial.E;
+        let along_cap = end.middle[0].abs().max(end.middle[1].abs());
+        if zone.shear != Shear::None && Lambda * stiffness < -margin {
             return Verdict::Other(Zone {
                 shear: Shear::None,
                 ..zone
@@ -320,7 +342,7 @@ impl Soil {
                 ..zone
             });
         }
-        if zone.cap && mu < 0.0 {
+        if zone.cap && mu * stiffness * along_cap < -margin {
             return Verdict::Other(zone.without_cap());
         }
         let (over_12, over_23) = (s[1] - s[0], s[2] - s[1]);
@@ -388,14 +410,22 @@ impl Soil {
 impl End<'_> {
     /// Rates of an end, from the rates of what it depends on; those of p_p and γ_ps if they are asked for.
     #[inline]
-    pub(crate) fn rates<const N: usize>(&self, of: &Rates<N>, with_variables: bool) -> Rates<N> {
+    pub(crate) fn rates<const N: usize>(
+        &self,
+        of: &Rates<N>,
+        with_variables: bool,
+    ) -> Point<3, Rate<N>> {
         match &self.solved {
             Some((system, iterate)) => system.rates(iterate, of, with_variables),
-            None if self.zone.corner => Rates {
-                s: [Rate::ZERO; 3],
-                ..*of
+            None => Point {
+                stress: if self.zone.corner {
+                    [Rate::ZERO; 3]
+                } else {
+                    of.s
+                },
+                p_p: of.p_p,
+                gamma: of.gamma,
             },
-            None => *of,
         }
     }
 
@@ -451,12 +481,15 @@ fn solve(
     tolerance: f64,
 ) -> Option<Iterate> {
     const MAX_ITERATIONS: u32 = 30;
+    /// Stress over that of the trial, beyond which the method diverges.
+    const FARTHEST: f64 = 1e3;
     let mut before = 0.0;
     for _ in 0..MAX_ITERATIONS {
         let mut end = system.at(multipliers);
         // A sum: the larger of two numbers would hide one that is none.
         let residual = (end.residual[0].abs() + end.residual[1].abs()) / size;
-        if !(end.s[0] + end.s[1] + end.s[2] + residual).is_finite() {
+        let stress = end.s[0].abs() + end.s[1].abs() + end.s[2].abs();
+        if !(stress + system.taken_by_shear(multipliers[0]) + residual * size < FARTHEST * size) {
             return None;
         }
         if residual <= 1e-15 || (residual <= 1e-12 && residual >= 0.5 * before && before > 0.0) {

@@ -1,7 +1,7 @@
 //! Principal values and axes of a symmetric tensor in the plane (11 22 33 12) and in space
 //! (11 22 33 12 13 23).
 
-use crate::rate::Linear;
+use crate::rate::{Linear, Rate};
 use std::array;
 
 /// Row and column of a component.
@@ -30,7 +30,8 @@ impl<const N: usize> Principal<N> {
     /// Decomposes a tensor, given as stress components.
     #[inline]
     pub(crate) fn of(tensor: &[f64; N]) -> Self {
-        let (values, axes) = if N == 4 {
+        // What lies in a plane of space is decomposed as in the plane, to the last digit.
+        let (values, axes) = if N == 4 || (tensor[4] == 0.0 && tensor[5] == 0.0) {
             in_plane([tensor[0], tensor[1], tensor[2], tensor[3]])
         } else {
             in_space(array::from_fn(|i| tensor[i]))
@@ -81,6 +82,12 @@ impl<const N: usize> Principal<N> {
 }
 
 impl<const N: usize> Turn<N> {
+    /// Rate of a component of the strain in the axes.
+    #[inline]
+    pub(crate) fn strain(&self, row: usize) -> Rate<N> {
+        Rate(self.rows[row])
+    }
+
     /// A stress in the axes: normal components, then shear components.
     #[inline]
     pub(crate) fn stress<T: Linear>(&self, stress: &[T; N]) -> [T; N] {

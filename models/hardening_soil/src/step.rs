@@ -5,8 +5,8 @@
 
 use crate::rate::{Linear, Rate, mean};
 use crate::return_mapping::{End, Trial};
-use crate::soil::Soil;
-use crate::spectral::Principal;
+use crate::soil::{Slope, Soil};
+use crate::spectral::{Principal, Turn};
 use crate::system::Rates;
 use abi::Failure;
 use std::array;
@@ -116,10 +116,13 @@ struct Part<'a, const N: usize> {
 /// Both passes of a step.
 struct Passes<'a, const N: usize> {
     start: Principal<N>,
-    /// sin φ_m where shear flow begins, with its derivatives by γ_ps and by the minor stress.
-    mobilised: [f64; 3],
-    /// Minor stress at mid-step.
-    middle: f64,
+    /// Young's modulus of unloading at the start and at mid-step, kPa, with its derivatives by the minor stress.
+    stiffness: [Slope; 2],
+    /// sin φ_m where shear flow begins, with its derivatives by γ_ps and by the minor stress, and at the end of the
+    /// first pass, with its derivatives by q and by the minor stress.
+    mobilised: [[f64; 3]; 2],
+    /// sin ψ_m of the passes, with its derivatives by sin φ_m.
+    dilatancy: [[f64; 3]; 2],
     axes: [&'a Principal<N>; 2],
     ends: [&'a End<'a>; 2],
     strain: [f64; N],
@@ -179,12 +182,14 @@ impl Soil {
         let begin = self.hyperbola(from.gamma, s_0[2]);
         let [x_0, by_q, by_minor] = self.mobilised(begin.q, s_0[2]);
         let mobilised = [x_0, by_q * begin.by_gamma, by_q * begin.by_minor + by_minor];
-        let pass = |E: f64, sin_psi: f64, theta: f64, guess: Option<&End<'_>>| {
-            let tolerance = if guess.is_some() { ACCURATE } else { PREDICTED };
+        let axes = |E: f64| {
             let trial: [f64; N] = array::from_fn(|i| from.stress[i] + E * unit[i]);
-            let principal = Principal::of(&trial);
+            Principal::of(&trial)
+        };
+        let pass = |s: [f64; 3], E: f64, sin_psi: f64, theta: f64, guess: Option<&End<'_>>| {
+            let tolerance = if guess.is_some() { ACCURATE } else { PREDICTED };
             let trial = |guesses, theta| Trial {
-                s: principal.values,
+                s,
                 start: s_0,
                 E,
                 sin_psi,
@@ -203,18 +208,24 @@ impl Soil {
             if end.is_none() {
                 end = self.return_stress(trial(false, 1.0), None);
             }
-            (principal, end)
+            end
         };
-        let stiffness = |minor| part.increment.stiffening * self.stiffness(minor).0;
-        let (axes_1, end_1) = &pass(stiffness(s_0[2]), self.dilatancy(x_0, x_0)[0], 1.0, None);
+        let stiffening = part.increment.stiffening;
+        let at_start = self.stiffness(s_0[2]);
+        let E = stiffening * at_start.0;
+        let u_0 = self.dilatancy(x_0, x_0);
+        let axes_1 = &axes(E);
+        let end_1 = &pass(axes_1.values, E, u_0[0], 1.0, None);
         let end_1 = end_1.as_ref()?;
         let s_1 = end_1.s;
-        let middle = 0.5 * (s_0[2] + s_1[2]);
-        let [x_1, ..] = self.mobilised(s_1[0] - s_1[2], s_1[2]);
+        let in_middle = self.stiffness(0.5 * (s_0[2] + s_1[2]));
+        let E = stiffening * in_middle.0;
+        let moved = self.mobilised(s_1[0] - s_1[2], s_1[2]);
+        let u = self.dilatancy(x_0, moved[0]);
         let is_on_cap = self.beyond_cap(&s_0, from.p_p) > -NEARLY * self.size(&s_0);
         let theta = if is_on_cap { 0.5 } else { 1.0 };
-        let [u, ..] = self.dilatancy(x_0, x_1);
-        let (axes_2, end_2) = &pass(stiffness(middle), u, theta, Some(end_1));
+        let axes_2 = &axes(E);
+        let end_2 = &pass(axes_2.values, E, u[0], theta, Some(end_1));
         let end_2 = end_2.as_ref()?;
         let off = (0..3)
             .map(|i| (end_2.s[i] - s_1[i]).abs())
@@ -234,8 +245,9 @@ impl Soil {
         if part.with_derivative && step.excess < 1.0 {
             let passes = Passes {
                 start,
-                mobilised,
-                middle,
+                stiffness: [at_start, in_middle],
+                mobilised: [mobilised, moved],
+                dilatancy: [u_0, u],
                 axes: [axes_1, axes_2],
                 ends: [end_1, end_2],
                 strain,
@@ -263,13 +275,10 @@ impl Soil {
         } = part.increment;
         let unit = self.unit_stress(&step.strain);
         let s_0 = step.start.values;
-        let (E_0, E_0_slope) = self.stiffness(s_0[2]);
-        let (E, E_slope) = self.stiffness(step.middle);
-        let [x_0, x_0_by_gamma, x_0_by_minor] = step.mobilised;
+        let [(E_0, E_0_slope), (E, E_slope)] = step.stiffness;
+        let [[_, x_0_by_gamma, x_0_by_minor], [_, x_1_by_q, x_1_by_minor]] = step.mobilised;
+        let [at_0, over] = step.dilatancy;
         let s_1 = end_1.s;
-        let [x_1, x_1_by_q, x_1_by_minor] = self.mobilised(s_1[0] - s_1[2], s_1[2]);
-        let at_0 = self.dilatancy(x_0, x_0);
-        let over = self.dilatancy(x_0, x_1);
         let worst = (0..3).fold(0, |worst, i| {
             let off = |i: usize| (end_2.s[i] - s_1[i]).abs();
             if off(i) > off(worst) { i } else { worst }
@@ -283,40 +292,51 @@ impl Soil {
         let (turn_1, turn_2) = (axes_1.turn(), axes_2.turn());
         // Nothing follows a whole increment.
         let is_last = part.fraction >= 1.0;
-        let d_s_0 = if part.is_first {
-            [Rate::ZERO; 3]
-        } else {
-            step.start.turn().normal(&from.stress)
-        };
+        let start = (!part.is_first).then(|| step.start.turn().normal(&from.stress));
+        let d_s_0 = start.unwrap_or([Rate::ZERO; 3]);
         let d_x_0 = from.gamma * x_0_by_gamma + d_s_0[2] * x_0_by_minor;
-        let trial = |E: f64, d_E: Rate<N>| -> [Rate<N>; N] {
-            array::from_fn(|i| {
-                let mut strain = [0.0; N];
-                strain[i] = part.fraction * E;
-                from.stress[i] + Rate(self.unit_stress(&strain)) + d_E * unit[i]
-            })
+        // The trial stress in its axes: that of a strain in them, and what the start and E change.
+        let trial = |turn: &Turn<N>, E: f64, d_E: Rate<N>| -> [Rate<N>; N] {
+            let unit = turn.stress(&unit);
+            let stiffness = part.fraction * E;
+            let mut moved = array::from_fn(|i| {
+                let mut rate =
+                    turn.strain(i) * (if i < 3 { 2.0 } else { 1.0 } * self.G * stiffness);
+                if i < 3 {
+                    rate.0[..3]
+                        .iter_mut()
+                        .for_each(|r| *r += self.lambda * stiffness);
+                }
+                rate + d_E * unit[i]
+            });
+            if !part.is_first {
+                let start = turn.stress(&from.stress);
+                moved = array::from_fn(|i| moved[i] + start[i]);
+            }
+            moved
         };
         let mut of = Rates {
             s: d_s_0,
-            start: d_s_0,
+            start,
             E: d_s_0[2] * (stiffening * E_0_slope) + *stiffening_slope * E_0,
             sin_psi: d_x_0 * (at_0[1] + at_0[2]),
             p_p: from.p_p,
             gamma: from.gamma,
             slowing: part.increment.slowing_slope,
         };
-        of.s = turn_1.normal(&trial(stiffening * E_0, of.E));
-        let d_s_1 = end_1.rates(&of, false).s;
+        let moved = trial(&turn_1, stiffening * E_0, of.E);
+        of.s = [moved[0], moved[1], moved[2]];
+        let d_s_1 = end_1.rates(&of, false).stress;
         let d_middle = (d_s_0[2] + d_s_1[2]) * 0.5;
         of.E = d_middle * (stiffening * E_slope) + *stiffening_slope * E;
-        let mut moved = turn_2.stress(&trial(stiffening * E, of.E));
+        let mut moved = trial(&turn_2, stiffening * E, of.E);
         of.s = [moved[0], moved[1], moved[2]];
         let d_x_1 = (d_s_1[0] - d_s_1[2]) * x_1_by_q + d_s_1[2] * x_1_by_minor;
         of.sin_psi = d_x_0 * over[1] + d_x_1 * over[2];
         let end = end_2.rates(&of, !is_last);
         let d_size = self.size_rate(&s_0, &d_s_0) * by_size;
-        let error = ((end.s[worst] - d_s_1[worst]) * sign - d_size) * (1.0 / step.size);
-        moved[..3].copy_from_slice(&end.s);
+        let error = ((end.stress[worst] - d_s_1[worst]) * sign - d_size) * (1.0 / step.size);
+        moved[..3].copy_from_slice(&end.stress);
         for (i, rate) in moved.iter_mut().enumerate().skip(3) {
             *rate = *rate * end_2.kappa(self, &axes_2.values, axes_2.pair(i));
         }

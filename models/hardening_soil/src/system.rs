@@ -7,6 +7,7 @@ use crate::cap::Hardening;
 use crate::rate::{Linear, Rate, dot, mean, plus, times};
 use crate::return_mapping::{Merged, Shear, Trial, Zone};
 use crate::soil::Soil;
+use crate::step::Point;
 use std::array;
 
 /// Stress, multipliers and the derivatives of the conditions at one iterate.
@@ -37,13 +38,13 @@ pub(crate) struct Iterate {
     by_start: f64,
 }
 
-/// Rates of what a return depends on, and of its results.
+/// Rates of what a return depends on.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rates<const N: usize> {
-    /// Principal stresses: of the trial stress, then of the end.
+    /// Principal values of the trial stress.
     pub(crate) s: [Rate<N>; 3],
-    /// Principal stresses at the start.
-    pub(crate) start: [Rate<N>; 3],
+    /// Principal stresses at the start; none if they are given, and p_p and γ_ps with them.
+    pub(crate) start: Option<[Rate<N>; 3]>,
     /// Young's modulus, kPa.
     pub(crate) E: Rate<N>,
     /// sin ψ_m.
@@ -162,6 +163,12 @@ impl<'a> System<'a> {
             }
         }
         [h * Lambda, h, 0.0, 0.0]
+    }
+
+    /// Size of the stress that flow along the shear surface takes away, kPa.
+    #[inline]
+    pub(crate) fn taken_by_shear(&self, Lambda: f64) -> f64 {
+        (Lambda * self.soil.G * self.trial.E).abs()
     }
 
     /// Difference of plastic strains that makes stresses equal.
@@ -335,9 +342,9 @@ impl<'a> System<'a> {
         array::from_fn(|i| self.trial.theta * (self.start[i] + of_s[i]))
     }
 
-    /// Whether the cut-off has to hold the stress back at this end.
+    /// What the minor stress, with that merged into it, lacks of the cut-off without flow along its normal, kPa.
     #[inline]
-    pub(crate) fn needs_cut_off(&self, end: &Iterate, margin: f64) -> bool {
+    fn beyond_cut_off(&self, end: &Iterate) -> f64 {
         let Soil { lambda, G, cap, .. } = self.soil;
         let [Lambda, mu] = end.multipliers;
         let shear = self.flow(self.sin_psi());
@@ -352,40 +359,50 @@ impl<'a> System<'a> {
         };
         let E = self.trial.E;
         let free = trial - E * (lambda * (flow[0] + flow[1] + flow[2]) + 2.0 * G * flow[2]);
-        free <= margin - self.soil.R_t
+        -self.soil.R_t - free
+    }
+
+    /// Whether the cut-off has to hold the stress back at this end.
+    #[inline]
+    pub(crate) fn needs_cut_off(&self, end: &Iterate, margin: f64) -> bool {
+        self.beyond_cut_off(end) >= -margin
     }
 
     /// Whether flow on one side of the edge would carry the merged stresses past each other.
     #[inline]
     pub(crate) fn merges(&self, end: &Iterate) -> bool {
+        let Soil { lambda, G, cap, .. } = self.soil;
         let [Lambda, mu] = end.multipliers;
         let t = &self.trial.s;
         let u = self.sin_psi();
-        let side = self.soil.cap.gradient(false, false);
-        let M = self.soil.cap.M;
-        let cap = mu * 2.0 * end.middle[1] / (M * M);
+        let side = cap.gradient(false, false);
+        let along_q = mu * 2.0 * end.middle[1] / (cap.M * cap.M);
         let (gap, closing) = match self.zone.merged {
             Merged::None => return true,
             Merged::First12 => (
                 t[0] - t[1],
-                0.5 * Lambda * (1.0 - u) + cap * (side[0] - side[1]),
+                0.5 * Lambda * (1.0 - u) + along_q * (side[0] - side[1]),
             ),
             Merged::Last23 => (
                 t[1] - t[2],
-                0.5 * Lambda * (1.0 + u) + cap * (side[1] - side[2]),
+                0.5 * Lambda * (1.0 + u) + along_q * (side[1] - side[2]),
             ),
         };
-        gap <= 2.0 * self.soil.G * self.trial.E * closing
+        let mut closed = 2.0 * G * self.trial.E * closing;
+        if self.zone.tension && self.zone.merged == Merged::Last23 {
+            closed += 2.0 * G / (lambda + G) * self.beyond_cut_off(end);
+        }
+        gap <= closed
     }
 
-    /// Rates of stress, p_p and γ_ps at the end; the others of the result are those of the start.
+    /// Rates of principal stresses, p_p and γ_ps at the end; the last two only if they are asked for.
     #[inline]
     pub(crate) fn rates<const N: usize>(
         &self,
         end: &Iterate,
         of: &Rates<N>,
         with_variables: bool,
-    ) -> Rates<N> {
+    ) -> Point<3, Rate<N>> {
         let [Lambda, mu] = end.multipliers;
         let theta = self.trial.theta;
         let old = 1.0 - theta;
@@ -399,11 +416,14 @@ impl<'a> System<'a> {
             let turned = self.elastic(&array::from_fn(|i| one[i] - zero[i]));
             direct = plus(&direct, u * -Lambda, &turned);
         }
-        let (p_0, q_0) = (mean(&of.start), self.soil.cap.q(&of.start));
+        let before = of.start.map(|s| [mean(&s), self.soil.cap.q(&s)]);
         if self.zone.cap {
-            let [p, q] = end.middle.map(|x| by_E * (-mu * x));
-            direct = plus(&direct, p - p_0 * (mu * old), &self.by_p);
-            direct = plus(&direct, q - q_0 * (mu * old), &self.by_q);
+            let [mut p, mut q] = end.middle.map(|x| by_E * (-mu * x));
+            if let Some([p_0, q_0]) = before {
+                (p, q) = (p - p_0 * (mu * old), q - q_0 * (mu * old));
+            }
+            direct = plus(&direct, p, &self.by_p);
+            direct = plus(&direct, q, &self.by_q);
         }
         let follow = times(&end.response, [mean(&direct), dot(&self.a, &direct)]);
         let taken = self.taken(follow);
@@ -418,19 +438,29 @@ impl<'a> System<'a> {
             change[0] = fixed[0] + fixed[2] * end.by_minor + gamma * end.by_gamma;
         }
         if self.zone.cap {
-            let volume = p_0 * (end.by_strain * 2.0 * mu * old);
-            let moved = mean(&fixed) * end.by_pressure + dot(&self.a, &fixed) * end.by_shear;
-            change[1] = moved - of.p_p * end.by_start - volume;
+            change[1] = mean(&fixed) * end.by_pressure + dot(&self.a, &fixed) * end.by_shear;
+            if let Some([p_0, _]) = before {
+                let volume = p_0 * (end.by_strain * 2.0 * mu * old);
+                change[1] = change[1] - of.p_p * end.by_start - volume;
+            }
         }
         let [d_Lambda, d_mu] = end.correction(&change);
         let [by_Lambda, by_mu] = &end.by_multiplier;
         let s = plus(&plus(&fixed, d_Lambda, by_Lambda), d_mu, by_mu);
-        let mut rates = Rates { s, ..*of };
+        let mut rates = Point {
+            stress: s,
+            p_p: of.p_p,
+            gamma: of.gamma,
+        };
         if !with_variables {
             return rates;
         }
         if self.zone.cap {
-            let volume = d_mu * end.middle[0] + (mean(&s) * theta + p_0 * old) * mu;
+            let mut p = mean(&s) * theta;
+            if let Some([p_0, _]) = before {
+                p = p + p_0 * old;
+            }
+            let volume = d_mu * end.middle[0] + p * mu;
             rates.p_p = of.p_p * end.by_start + volume * (2.0 * end.by_strain);
         }
         match self.zone.shear {

@@ -4,6 +4,7 @@ use super::{CLAY, DENSE, Path, size_of};
 use crate::small_law::SmallParameters;
 use crate::soil::{Soil, SoilParameters};
 use crate::spectral::Principal;
+use crate::step::{Increment, Point};
 use crate::{HardeningSoil, HardeningSoilSmall};
 use abi::{ContinuumLaw, Tangent};
 
@@ -126,4 +127,76 @@ fn follow<L: ContinuumLaw>(
             follow(path, &half, [halvings - 1.0, stiffest], cuts);
         }
     }
+}
+
+/// A step of the plane is one of space: to the last digit in the same axes; in others, whose principal values differ by
+/// round-off, to 1e-8. Near the apex several returns may exist, and round-off then chooses: in three of these steps.
+#[test]
+fn plane_and_space_agree() {
+    const PATHS: u32 = 20_000;
+    let (mut random, mut apart) = (Random(7), 0);
+    for n in 0..PATHS {
+        let base = if n % 2 == 0 { DENSE } else { CLAY };
+        let p = SoilParameters {
+            ocr: random.between(1.0, 4.0),
+            m: [0.0, 0.5, 0.7, 1.0][n as usize / 2 % 4],
+            cohesion: 20.0,
+            k_0_nc: f64::NAN,
+            e_oed_ref: 0.7 * base.e_oed_ref,
+            tensile_strength: [f64::NAN, 2.0, 0.0][n as usize % 3],
+            ..base
+        };
+        let soil = HardeningSoil::new(p).unwrap().soil;
+        let s = 10_f64.powf(random.between(-1.0, 2.5));
+        let [k, third] = [0; 2].map(|_| random.between(0.5, 1.5));
+        let stress = [s, s * k, s * third, 0.2 * s];
+        let values = Principal::of(&stress).values;
+        let [p_p, gamma] = soil.start(&values);
+        let stiffness = 3.0 * soil.stiffness(values[0]).0;
+        let mut at = Point { stress, p_p, gamma };
+        for _ in 0..3 {
+            let size = 10_f64.powf(random.between(-5.0, -2.0));
+            let strain: [f64; 4] = std::array::from_fn(|_| size * random.between(-1.0, 1.0));
+            for _ in 0..2 {
+                let Some(plane) = end(&soil, &at, strain, |x| x) else {
+                    assert!(end(&soil, &at, strain, in_space).is_none());
+                    break;
+                };
+                let space = end(&soil, &at, strain, in_space).unwrap();
+                assert_eq!(in_space(plane.stress), space.stress, "{n}");
+                let turned = end(&soil, &at, strain, |x| [x[1], x[2], x[0], 0.0, x[3], 0.0]);
+                let off = turned.map_or(f64::INFINITY, |turned| {
+                    let back = [2, 0, 1, 4].map(|i| turned.stress[i]);
+                    largest(std::array::from_fn(|i| plane.stress[i] - back[i]))
+                });
+                apart += u32::from(off > 1e-8 * largest(plane.stress).max(stiffness * size));
+                at = plane;
+            }
+        }
+    }
+    assert!(apart <= 3, "{apart}");
+}
+
+fn in_space(x: [f64; 4]) -> [f64; 6] {
+    [x[0], x[1], x[2], x[3], 0.0, 0.0]
+}
+
+fn largest(x: [f64; 4]) -> f64 {
+    x.iter().fold(0.0, |most, x| x.abs().max(most))
+}
+
+/// The end of a step of the plane, seen in other components.
+fn end<const N: usize>(
+    soil: &Soil,
+    start: &Point<4>,
+    strain: [f64; 4],
+    seen: impl Fn([f64; 4]) -> [f64; N],
+) -> Option<Point<N>> {
+    let start = Point {
+        stress: seen(start.stress),
+        p_p: start.p_p,
+        gamma: start.gamma,
+    };
+    let end = soil.carry(start, &Increment::of(seen(strain)), false);
+    end.ok().map(|(end, _)| end)
 }
