@@ -291,6 +291,15 @@ def test_a_wrong_sample_is_refused(here: Path) -> None:
     assert (caught.value.file, caught.value.key) == (None, "method")
 
 
+def test_whole_numbers_of_a_sample_are_the_nearest(here: Path) -> None:
+    (here / "chamber.toml").write_text(CHAMBER)
+    whole = {"name": "increments", "key": "phase.loading.increments", "whole": True}
+    asked = {"case": "chamber.toml", "parameter": [whole], "outputs": {"shaft": {"probe": "q_s"}}}
+    study = pilum.study(asked, sample=[[2.2], [2.8]])
+    assert study.runs["increments"].tolist() == [2, 3]
+    assert [len(study.curves.where(run=run, phase="loading")) for run in (1, 2)] == [2, 3]
+
+
 def test_checks_and_reports(saltelli: pilum.Study) -> None:
     checked = pilum.check("elastic", only=["library-opens"])
     assert checked.passed and checked.counts["passed"] >= 1 and "library-opens" in checked._repr_html_()
