@@ -12,11 +12,7 @@ if [ "${1-}" = --manylinux ]; then
   command -v python-zig >/dev/null || { echo "Zig is missing: pip install ziglang" >&2; exit 1; }
   packing=(--compatibility manylinux_2_28)
   export CARGO_TARGET_DIR=$target/manylinux
-  export CARGO_TARGET_X86_64_UNKNOWN_LINUX_GNU_LINKER=$CARGO_TARGET_DIR/linker
-  mkdir -p "$CARGO_TARGET_DIR"
-  # shellcheck disable=SC2016  # of the file
-  printf '#!/bin/sh\nexec python-zig cc -target x86_64-linux-gnu.2.28 "$@"\n' >"$CARGO_TARGET_DIR/linker"
-  chmod +x "$CARGO_TARGET_DIR/linker"
+  export CARGO_TARGET_X86_64_UNKNOWN_LINUX_GNU_LINKER=$PWD/host/python/zig-linker.sh
 fi
 out=$(realpath -m "${1:-$target/wheels}")
 command -v maturin >/dev/null || { echo "maturin is missing: pip install maturin" >&2; exit 1; }
