@@ -1,7 +1,7 @@
 //! Laws in other programs, and laws of other programs here. Routes and traps: abi/interoperability.md.
 //!
-//! Tests that need OpenGeoSys, Kratos or SALib are skipped with a remark if these are not installed, or
-//! fail (`tests::needs`): `install.sh` next to this file installs them. Tests that need DOLFINx never fail
+//! Tests that need OpenGeoSys, Kratos, SALib or CalculiX are skipped with a remark if these are not installed, or
+//! fail (`tests::needs`): `install.sh` next to this file installs the first three. Tests that need DOLFINx never fail
 //! for lack of it, but are skipped with a remark: `cases/distributed/install.sh` installs it.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
@@ -52,6 +52,7 @@ fn a_missing_program_is_named() {
         let what = format!("{program} (tests/interoperability/install.sh)");
         needs::assert_named(test, &what);
     }
+    needs::assert_named("exchange::calculix_gives_our_table", exchange::CALCULIX);
 }
 
 /// The last line that a program prints.

@@ -183,8 +183,9 @@ def test_derivatives_and_likelihood(boxes: tuple[pilum.Calibration, pilum.Calibr
     with pytest.raises(pilum.InputError, match="shape"):
         problem.log_likelihood([1.0])
     for function in (problem.residuals, problem.jacobian):
-        with pytest.raises(pilum.InputError, match="`shear_stiffness` is -1, outside .10000, 1000000."):
+        with pytest.raises(pilum.InputError, match="`shear_stiffness` is -1, outside .10000, 1000000.") as caught:
             function([-1.0, 5.0, 31.0])
+        assert caught.value.key == "shear_stiffness" and "in:" not in str(caught.value)
         with pytest.raises(pilum.InputError, match="`cohesion` is NaN"):
             function([1e5, np.nan, 31.0])
 
@@ -288,6 +289,15 @@ def test_a_wrong_sample_is_refused(here: Path) -> None:
     with pytest.raises(pilum.InputError) as caught:
         pilum.study({"case": "chamber.toml", "method": "lst"})
     assert (caught.value.file, caught.value.key) == (None, "method")
+
+
+def test_whole_numbers_of_a_sample_are_the_nearest(here: Path) -> None:
+    (here / "chamber.toml").write_text(CHAMBER)
+    whole = {"name": "increments", "key": "phase.loading.increments", "whole": True}
+    asked = {"case": "chamber.toml", "parameter": [whole], "outputs": {"shaft": {"probe": "q_s"}}}
+    study = pilum.study(asked, sample=[[2.2], [2.8]])
+    assert study.runs["increments"].tolist() == [2, 3]
+    assert [len(study.curves.where(run=run, phase="loading")) for run in (1, 2)] == [2, 3]
 
 
 def test_checks_and_reports(saltelli: pilum.Study) -> None:

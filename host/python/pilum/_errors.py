@@ -73,7 +73,8 @@ class Error(Exception):
     column: int | None = None
     """The column of it, from 1."""
     key: str | None = None
-    """The wrong key of a dictionary or of `set`, as in `set`; entries of lists by their `name`, or from 1."""
+    """The wrong key of a dictionary or of `set`, as in `set`; entries of lists by their `name`, or from 1. The
+    parameter whose value is out of bounds."""
     text: str | None = None
     """The text at that place."""
 
@@ -90,7 +91,7 @@ class Error(Exception):
         lines = [self.message]
         if self.file is not None:
             lines[0] = f"{self.file}:{self.line}:{self.column}: {self.message}"
-        if self.key and not (self.text or "").startswith(self.key):
+        if self.key and not (self.text or self.message).lstrip("`").startswith(self.key):
             lines.append(f"  in: {self.key}")
         if self.text:
             lines.append(f"  at: {self.text}")

@@ -34,6 +34,8 @@ _MESHIO = {
     "line": (2, 1),
     "vertex": (1, 0),
 }
+# Kinds that meshio reads side by side in XDMF.
+_MIXED = {"quad", "triangle", "line"}
 
 
 class Mesh:
@@ -177,9 +179,8 @@ class Mesh:
             mesh.cell_data = {"cell_tags": [-1 - of_block for of_block in numbers]}
         elif any("-" in name or " " in name for name in names):
             raise InputError("a name with `-` or a blank is not read back from this format", hint="`.msh` takes any")
-        elif Path(path).suffix == ".xdmf" and len(mesh.cells) > 1:
-            kinds = ", ".join(block.type for block in mesh.cells)
-            raise InputError(f"meshio 5.3.5 cannot read XDMF with cells of several kinds, found {kinds}")
+        elif Path(path).suffix == ".xdmf" and len(kinds := {block.type for block in mesh.cells}) > 1 and kinds - _MIXED:
+            raise InputError(f"meshio 5.3.5 cannot read XDMF with these cells together: {', '.join(sorted(kinds))}")
         else:
             mesh.cell_data = {"-".join(names): numbers}
         mesh.write(path)

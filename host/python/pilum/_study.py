@@ -122,9 +122,10 @@ def study(
 
     `file` is a study file or a dictionary with its keys, whose paths are relative to the working folder. `sample`
     replaces its method: values of shape (runs, parameters), in the order and unit of the file's parameters, or a
-    mapping (a DataFrame, say) by their names. Results go into the folder `results`, default `results/<study>`; what is
-    done there is not repeated unless `retry` (runs that failed) or `anew` say so. `jobs` is the number of runs at a
-    time. A run that fails has a state and no exception. Raises InputError or LawError.
+    mapping (a DataFrame, say) by their names; those of a `whole` parameter are rounded. Results go into the folder
+    `results`, default `results/<study>`; what is done there is not repeated unless `retry` (runs that failed) or
+    `anew` say so. `jobs` is the number of runs at a time. A run that fails has a state and no exception. Raises
+    InputError or LawError.
     """
     name = "study" if isinstance(file, Mapping) else _stem(Path(file))
     folder = Path("results") / name if results is None else Path(results)
@@ -178,7 +179,7 @@ def _with_sample(content: dict[str, Any], sample: Any) -> dict[str, Any]:
     for parameter, values in zip(parameters, columns):
         own = {key: value for key, value in parameter.items() if key in ("name", "key")}
         if parameter.get("whole"):
-            values = values.astype(np.int64)
+            values = np.rint(values).astype(np.int64)
         listed.append({**own, "values": values.tolist()})
     kept = {key: value for key, value in content.items() if key not in ("runs", "seed")}
     return {**kept, "method": "list", "parameter": listed}

@@ -109,6 +109,7 @@ fn fill(to: &Bound<'_, PyDict>, error: &Error, written: Option<&str>) -> PyResul
     match error {
         Error::Simulation { error, .. } => of_simulation(to, error),
         Error::Point(error) => of_driver(to, error),
+        Error::Text(text::Error::OutOfBounds { name, .. }) => to.set_item("key", name),
         _ => Ok(()),
     }
 }

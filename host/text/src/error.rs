@@ -29,6 +29,16 @@ pub enum Error {
     /// The request does not fit the files.
     #[error("{0}")]
     Usage(String),
+    /// A value that was asked for is out of bounds.
+    #[error("`{name}` is {value}, outside [{}, {}]", bounds[0], bounds[1])]
+    OutOfBounds {
+        /// Whose value.
+        name: String,
+        /// The value.
+        value: f64,
+        /// The least and the greatest one.
+        bounds: [f64; 2],
+    },
     /// A defect of the program.
     #[error("internal error: {0}")]
     Internal(String),
@@ -56,7 +66,10 @@ impl Error {
             Self::Unwritable { .. } => {
                 Some("name another place for the results on the command line")
             }
-            Self::Unreadable { .. } | Self::Usage(_) | Self::Internal(_) => None,
+            Self::Unreadable { .. }
+            | Self::Usage(_)
+            | Self::OutOfBounds { .. }
+            | Self::Internal(_) => None,
         }
     }
 

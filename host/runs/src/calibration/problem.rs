@@ -137,12 +137,16 @@ impl ResidualProblem {
     /// Values as the search counts them.
     fn place(&self, values: &[f64]) -> Result<Vec<f64>, Error> {
         let counted = |(p, &value): (&Parameter, &f64)| {
-            let [low, high] = p.bounds;
-            if (low..=high).contains(&value) {
+            let (name, bounds) = (p.name.clone(), p.bounds);
+            if (bounds[0]..=bounds[1]).contains(&value) {
                 return Ok(p.counted(value));
             }
-            let message = format!("`{}` is {value}, outside [{low}, {high}]", p.name);
-            Err(Error::usage(message))
+            Err(text::Error::OutOfBounds {
+                name,
+                value,
+                bounds,
+            }
+            .into())
         };
         self.parameters().iter().zip(values).map(counted).collect()
     }
