@@ -496,7 +496,8 @@ fn solve(
         // A sum: the larger of two numbers would hide one that is none.
         let residual = (end.residual[0].abs() + end.residual[1].abs()) / size;
         let stress = end.s[0].abs() + end.s[1].abs() + end.s[2].abs();
-        if !(stress + system.taken_by_shear(multipliers[0]) + residual * size < FARTHEST * size) {
+        let reach = (stress + system.taken_by_shear(multipliers[0])) / size + residual;
+        if reach.is_nan() || reach >= FARTHEST {
             return None;
         }
         if residual <= 1e-15 || (residual <= 1e-12 && residual >= 0.5 * before && before > 0.0) {
