@@ -61,6 +61,26 @@ impl Zone {
         }
     }
 
+    /// The zone to try next, where `other` is due, with multipliers to start from; `base` is what the trial stress
+    /// merges.
+    #[inline]
+    fn followed_by(self, mut other: Self, base: Merged, multipliers: &mut [f64; 2]) -> Self {
+        let is_active = [other.shear != Shear::None, other.cap];
+        for (x, is_active) in multipliers.iter_mut().zip(is_active) {
+            *x = if is_active { *x } else { 0.0 };
+        }
+        // Less flow may not close the gap any more; more flow does.
+        let is_less =
+            (self.cap && !other.cap) || (self.shear != Shear::None && other.shear == Shear::None);
+        if is_less {
+            other.merged = base;
+        }
+        if other.shear == Shear::None && !other.cap {
+            other.merged = Merged::None;
+        }
+        other
+    }
+
     #[inline]
     fn is_elastic(self) -> bool {
         self.shear == Shear::None && !self.cap && !self.tension && !self.corner
@@ -271,20 +291,7 @@ impl Soil {
                     if zone.shear == Shear::Limit && other.shear == Shear::Hardening {
                         may_harden = false;
                     }
-                    let is_active = [other.shear != Shear::None, other.cap];
-                    for (x, is_active) in multipliers.iter_mut().zip(is_active) {
-                        *x = if is_active { *x } else { 0.0 };
-                    }
-                    // Less flow may not close the gap any more; more flow does.
-                    let is_less = (zone.cap && !other.cap)
-                        || (zone.shear != Shear::None && other.shear == Shear::None);
-                    zone = other;
-                    if is_less {
-                        zone.merged = base;
-                    }
-                    if zone.shear == Shear::None && !zone.cap {
-                        zone.merged = Merged::None;
-                    }
+                    zone = zone.followed_by(other, base, &mut multipliers);
                     if zone.is_elastic() {
                         return None;
                     }
@@ -489,7 +496,8 @@ fn solve(
         // A sum: the larger of two numbers would hide one that is none.
         let residual = (end.residual[0].abs() + end.residual[1].abs()) / size;
         let stress = end.s[0].abs() + end.s[1].abs() + end.s[2].abs();
-        if !(stress + system.taken_by_shear(multipliers[0]) + residual * size < FARTHEST * size) {
+        let reach = (stress + system.taken_by_shear(multipliers[0])) / size + residual;
+        if reach.is_nan() || reach >= FARTHEST {
             return None;
         }
         if residual <= 1e-15 || (residual <= 1e-12 && residual >= 0.5 * before && before > 0.0) {

@@ -163,7 +163,9 @@ fn plane_and_space_agree() {
                     break;
                 };
                 let space = end(&soil, &at, strain, in_space).unwrap();
-                assert_eq!(in_space(plane.stress), space.stress, "{n}");
+                let expected = in_space(plane.stress);
+                let same = |i: usize| (expected[i] - space.stress[i]).abs() <= 0.0;
+                assert!((0..6).all(same), "{n}: {expected:?} {:?}", space.stress);
                 let turned = end(&soil, &at, strain, |x| [x[1], x[2], x[0], 0.0, x[3], 0.0]);
                 let off = turned.map_or(f64::INFINITY, |turned| {
                     let back = [2, 0, 1, 4].map(|i| turned.stress[i]);
