@@ -182,6 +182,10 @@ def test_derivatives_and_likelihood(boxes: tuple[pilum.Calibration, pilum.Calibr
     assert problem.log_likelihood(-problem.best) == -np.inf
     with pytest.raises(pilum.InputError, match="shape"):
         problem.log_likelihood([1.0])
+    with pytest.raises(pilum.InputError, match="no array of 3 numbers"):
+        problem.residuals({"cohesion": 5.0})  # type: ignore[arg-type]
+    with pytest.raises(pilum.InputError, match="`scatter` is 0.0, expected above 0"):
+        problem.log_likelihood(problem.best, 0.0)
     for function in (problem.residuals, problem.jacobian):
         with pytest.raises(pilum.InputError, match="`shear_stiffness` is -1, outside .10000, 1000000.") as caught:
             function([-1.0, 5.0, 31.0])
@@ -261,6 +265,9 @@ def saltelli(tmp_path_factory: pytest.TempPathFactory) -> pilum.Study:
     (folder / "chamber.toml").write_text(CHAMBER)
     (folder / "study.toml").write_text(STUDY)
     return pilum.study(folder / "study.toml", results=folder / "out")
+    with pytest.raises(pilum.InputError, match="expected 1 to 1000") as caught:
+        pilum.calibrate(file, set={"starts": 2000})
+    assert (caught.value.file, caught.value.key) == (None, "starts") and "--set" not in str(caught.value)
 
 
 def test_a_study_is_an_object(saltelli: pilum.Study) -> None:
@@ -298,6 +305,9 @@ def test_whole_numbers_of_a_sample_are_the_nearest(here: Path) -> None:
     study = pilum.study(asked, sample=[[2.2], [2.8]])
     assert study.runs["increments"].tolist() == [2, 3]
     assert [len(study.curves.where(run=run, phase="loading")) for run in (1, 2)] == [2, 3]
+    for wrong in ("many", np.nan):
+        with pytest.raises(pilum.InputError, match="the sample of `increments`"):
+            pilum.study(asked, sample=[[wrong]], results="wrong")
 
 
 def test_checks_and_reports(saltelli: pilum.Study) -> None:

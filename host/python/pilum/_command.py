@@ -46,7 +46,7 @@ def _error(code: int, text: str) -> Error:
     text = text[start:].strip()
     attributes: dict[str, Any] = {}
     place = _PLACE.search(text)
-    if place is not None:
+    if place is not None and place[1] != "--set":  # which nobody has written
         attributes.update(file=place[1], line=int(place[2]), column=int(place[3]))
     written = _TEXT.search(text)
     if place is not None and written is not None:

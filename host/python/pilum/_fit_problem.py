@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _pilum
 from ._calibrate import Calibration, calibrate
-from ._errors import InputError
+from ._errors import InputError, WrongTypeError
 
 __all__ = ["CalibrationProblem"]
 
@@ -77,7 +77,10 @@ class CalibrationProblem:
 
         Weights are no information and do not count. It is -inf outside `bounds` and where a test has no answer.
         """
-        return float(self._of(self._core.log_likelihood, theta, self.scatter if scatter is None else scatter))
+        scatter = self.scatter if scatter is None else scatter
+        if not scatter > 0.0:
+            raise InputError(f"`scatter` is {scatter}, expected above 0", key="scatter")
+        return float(self._of(self._core.log_likelihood, theta, scatter))
 
     def __repr__(self) -> str:
         return f"<pilum.CalibrationProblem of {', '.join(self.names)}: {self._core.points} points>"
@@ -94,7 +97,10 @@ class CalibrationProblem:
             return _pilum.Residuals(*self._arguments, folder)
 
     def _of(self, function: Any, theta: ArrayLike, *more: float) -> Any:
-        values = np.asarray(theta, dtype=np.float64)
+        try:
+            values = np.asarray(theta, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise WrongTypeError(f"theta is no array of {len(self.names)} numbers") from None
         if values.shape != self.start.shape:
             raise InputError(f"theta has shape {values.shape}, expected {self.start.shape}")
         with tempfile.TemporaryDirectory() as folder:

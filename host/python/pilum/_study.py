@@ -179,7 +179,14 @@ def _with_sample(content: dict[str, Any], sample: Any) -> dict[str, Any]:
     for parameter, values in zip(parameters, columns):
         own = {key: value for key, value in parameter.items() if key in ("name", "key")}
         if parameter.get("whole"):
-            values = np.rint(values).astype(np.int64)
+            try:
+                numbers = np.asarray(values, dtype=np.float64)
+            except (TypeError, ValueError):
+                numbers = np.array([np.nan])
+            if not np.all(np.isfinite(numbers)):
+                name = _name(parameter)
+                raise InputError(f"the sample of `{name}` has something else than numbers", key=name)
+            values = np.rint(numbers).astype(np.int64)
         listed.append({**own, "values": values.tolist()})
     kept = {key: value for key, value in content.items() if key not in ("runs", "seed")}
     return {**kept, "method": "list", "parameter": listed}
