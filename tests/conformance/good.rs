@@ -54,7 +54,12 @@ fn hardening_soil_passes_where_surfaces_matter() {
     let report = check(&library_of("hardening_soil"), &only);
     // At 5·10¹⁰ kPa 2·10⁻⁹ of the stiffness is left where the stress does not change: a warning.
     assert_eq!(report.with(&["warning"]), ids[1..2], "{:#}", report.json);
-    assert_eq!(report.with(&["passed", "warning"]), ids, "{:#}", report.json);
+    assert_eq!(
+        report.with(&["passed", "warning"]),
+        ids,
+        "{:#}",
+        report.json
+    );
 }
 
 #[test]

@@ -6,7 +6,8 @@
 //! Law         mohr_coulomb with φ = 36°, ψ = 0; coulomb_joint at shaft and base.
 //! Asserts     regularised corrections lead there, but for one step at most: no tolerated residual. The load is the same to
 //!             1.5 % in 10, 20 and 40 increments and with a tolerance a tenth as large, and to 1e-6 in another unit of
-//!             stress. A pressure that the shaft cannot carry has no equilibrium, however long it is looked for.
+//!             stress. A pressure that the shaft cannot carry has no equilibrium, however long it is looked for; nor has
+//!             a block that is pushed beyond its friction.
 
 use crate::setup::{Finished, Results, fail, run};
 use std::f64::consts::PI;
@@ -135,4 +136,62 @@ head = {{ line = "head", quantity = "displacement_z" }}
         .as_f64()
         .unwrap();
     assert!((reached * 1.25 - 1.0).abs() < 5e-3, "{reached}");
+}
+
+/// A block of 2 m under 50 kPa on a joint of φ = 25° slides at 100 tan φ. A residual within a loose tolerance is no reason
+/// to let it slide away.
+#[test]
+fn a_block_pushed_beyond_its_friction_is_in_no_equilibrium() {
+    let limit = 2.0 * 50.0 * 25.0_f64.to_radians().tan();
+    for (beyond, increments) in [(1.0005, 10), (1.002, 40), (1.01, 10)] {
+        let text = format!(
+            r#"
+title = "block"
+analysis = "plane_strain"
+[mesh]
+origin = [-1.0, 0.0]
+columns = [{{ n = 6, to = 1.0 }}]
+rows = [{{ n = 4, to = 3.0, ratio = 0.75 }}, {{ n = 4, to = 4.0 }}]
+lines.left = {{ x = -1.0, y = [0.0, 3.0] }}
+lines.right = {{ x = 1.0, y = [0.0, 3.0] }}
+lines.bottom = {{ y = 0.0 }}
+lines.joint = {{ y = 3.0 }}
+lines.top = {{ y = 4.0 }}
+region = [{{ group = "soil" }}, {{ group = "block", y = [3.0, 4.0] }}]
+[laws]
+soil = {{ law = "elastic", parameters = {{ young_modulus = 50e3, poisson_ratio = 0.3 }} }}
+concrete = {{ law = "elastic", parameters = {{ young_modulus = 10e6, poisson_ratio = 0.2 }} }}
+skin = {{ law = "coulomb_joint", parameters = {{ normal_stiffness = 1e6, shear_stiffness = 1e5, cohesion = 0.0, friction_angle = 25.0, dilatancy_angle = 0.0 }} }}
+[groups]
+soil = {{ formulation = "solid", law = "soil" }}
+block = {{ formulation = "solid", law = "concrete" }}
+joint = {{ formulation = "zero_thickness", line = "joint", law = "skin" }}
+[[supports]]
+line = "left"
+fixed = ["x"]
+[[supports]]
+line = "right"
+fixed = ["x"]
+[[supports]]
+line = "bottom"
+fixed = ["x", "y"]
+[[phase]]
+name = "press"
+increments = 1
+pressure = [{{ line = "top", value = 50.0 }}]
+[[phase]]
+name = "push"
+increments = {increments}
+force = [{{ line = "top", x = {} }}]
+[solver]
+force_tolerance = 1e-4
+displacement_tolerance = 1e-2
+"#,
+            beyond * limit
+        );
+        let failed = fail(&text);
+        let reached = failed.summary()["stopped_at"]["load_factor"].as_f64();
+        let reached = beyond * reached.unwrap();
+        assert!((reached - 1.0).abs() < 1e-3, "{beyond}: {reached}");
+    }
 }

@@ -39,8 +39,8 @@ pub enum Neighbour {
 }
 
 impl Simulation {
-    /// Counts a motion that led to equilibrium, and reports the first one of its kind; the phase's end reports their
-    /// number.
+    /// Counts a step that regularised corrections or a motion led to equilibrium, and reports the first one of its kind;
+    /// the phase's end reports their number.
     pub(super) fn note_motion(
         &mut self,
         success: &StepSuccess,
@@ -49,6 +49,14 @@ impl Simulation {
         (place, phase): (&Place, &mut UnderWay),
         watch: &mut dyn Watch,
     ) {
+        if success.regularised {
+            phase.record.regularised += 1;
+            if phase.record.regularised == 1 {
+                let other = self.neighbour(phase, success, step, Trial::Viscous);
+                watch.warning(&Warning::Regularised(place.clone(), other));
+            }
+            return;
+        }
         phase.record.relaxed += 1;
         if control == Control::Viscous {
             phase.record.viscous += 1;

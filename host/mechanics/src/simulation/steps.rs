@@ -117,7 +117,7 @@ impl Simulation {
         watch: &mut dyn Watch,
     ) -> Result<(), Error> {
         self.look_after(&success, (self.clock(phase.number), step), watch);
-        if success.relaxed {
+        if success.relaxed || success.regularised {
             self.note_motion(&success, step, way.lead.control, (way.place, phase), watch);
         }
         // Of a motion, and of what is tolerated, more is said already.
@@ -278,7 +278,6 @@ impl Simulation {
             record.unsettled = record.unsettled.max(above.unwrap_or(0.0));
         }
         record.round_off = record.round_off.max(success.round_off);
-        record.regularised += usize::from(success.regularised);
         let tolerance = self.problem.settings.force_tolerance;
         let scale = success.scales.iter().copied().fold(0.0, f64::max);
         let residual = success.iterations.last().map_or(0.0, |last| last.residual);

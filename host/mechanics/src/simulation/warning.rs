@@ -62,8 +62,10 @@ pub enum Warning {
         /// The largest last correction, relative to its increment.
         left: f64,
     },
-    /// Relaxation led to the equilibrium of this increment, the first one of its phase; where another way leads.
+    /// Viscous relaxation led to the equilibrium of this increment, the first one of its phase; where another way leads.
     Relaxed(Place, Option<Neighbour>),
+    /// The same of regularised corrections.
+    Regularised(Place, Option<Neighbour>),
     /// Steps of an increment were cut back; where two halves of a shorter one lead, the first of its phase that lead
     /// elsewhere.
     CutBack(Place, Neighbour),
@@ -198,7 +200,8 @@ impl fmt::Display for Warning {
                 "phase `{phase}`: `force_tolerance` {asked:.1e} is below round-off: the residual stays at {left:.1e}, the last \
                  bit of the displacements"
             ),
-            Self::Relaxed(place, by_viscous_control) => relaxed(f, place, *by_viscous_control),
+            Self::Relaxed(place, other) => stalled(f, place, "viscous relaxation", *other),
+            Self::Regularised(place, other) => stalled(f, place, "regularised corrections", *other),
             Self::CutBack(place, in_halves) => cut_back(f, place, *in_halves),
             Self::Unsettled { phase, asked, left } => unsettled(f, phase, [*asked, *left]),
             Self::Viscous(place) => write!(f, "{place}: {VISCOUS}. {COMPARE}"),
@@ -362,12 +365,13 @@ fn cut_back(f: &mut fmt::Formatter<'_>, place: &Place, in_halves: Neighbour) -> 
     write!(f, ". Compare with a run with more increments")
 }
 
-fn relaxed(
+fn stalled(
     f: &mut fmt::Formatter<'_>,
     place: &Place,
+    way: &str,
     by_viscous_control: Option<Neighbour>,
 ) -> fmt::Result {
-    let found = "Newton iterations stalled; viscous relaxation found";
+    let found = format!("Newton iterations stalled; {way} found");
     match by_viscous_control {
         Some(Neighbour::Apart {
             displacements,

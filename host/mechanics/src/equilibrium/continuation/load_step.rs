@@ -365,10 +365,11 @@ impl LoadControl {
         match self.evaluate(newton, at, operator) {
             Err(failure) if failure.is_stop() => return Err(failure),
             Ok(next)
-                if next.balance.relative <= newton.settings.force_tolerance
-                    || self
-                        .regularised
-                        .takes(next.balance.relative / state.balance.relative) =>
+                if !next.balance.away.contains(&true)
+                    && (next.balance.relative <= newton.settings.force_tolerance
+                        || self
+                            .regularised
+                            .takes(next.balance.relative / state.balance.relative)) =>
             {
                 self.regularised.has_tried_newton(true);
                 iterations.push(newton.took(&next, &correction.increment, 1.0));

@@ -249,6 +249,7 @@ impl Regularised {
         self.halvings = if halves { self.halvings + 1 } else { 0 };
         self.has_settled = length >= 1.0
             && next.balance.relative <= newton.settings.force_tolerance
+            && !next.balance.away.contains(&true)
             && self.is_near(&taken, newton.settings.displacement_tolerance)
             && newton_leaves(newton, task, &next.increment)? <= HELD;
         newton.kept.contraction = f64::INFINITY;
@@ -277,7 +278,8 @@ impl Regularised {
     }
 }
 
-/// Size of a whole Newton correction of a state, relative to its increment; infinite if the tangent is singular.
+/// Size of a whole Newton correction of a state, relative to its increment as far as that may measure it; infinite if
+/// the tangent is singular.
 ///
 /// # Errors
 /// The step is stopped, or a law fails.
@@ -292,7 +294,7 @@ pub(super) fn newton_leaves(
         .and_then(|_| newton.correction_of(&balance));
     match correction {
         Err(failure) if failure.is_singular() => Ok(f64::INFINITY),
-        correction => Ok(norm(&correction?) / norm(increment).max(f64::MIN_POSITIVE)),
+        correction => Ok(newton.relative(&correction?, increment)),
     }
 }
 

@@ -8,7 +8,7 @@
 use super::acceptance::{Change, Forces, MOVES};
 use super::failure::{Runaway, Singularity};
 use super::residual::Task;
-use super::{Equations, Newton};
+use super::{Equations, Newton, norm};
 use crate::assembly::norms;
 use crate::group::Group;
 use algebra::{LastMatrix, LinearSolver, Singular};
@@ -194,6 +194,15 @@ impl Newton<'_> {
         let both = sizes.iter().zip(moved).enumerate();
         both.map(|(body, (&size, moved))| Change::of(size, moved, self.reference.expected(body)))
             .collect()
+    }
+
+    /// How large a correction is, all bodies together, relative to the increment as far as that may measure it.
+    pub(in crate::equilibrium) fn relative(&self, correction: &[f64], moved: &[f64]) -> f64 {
+        let bodies = self.by_body(correction).len();
+        let predicted: Vec<f64> = (0..bodies)
+            .map(|body| self.reference.expected(body))
+            .collect();
+        Change::of(norm(correction), norm(moved), norm(&predicted)).relative
     }
 
     /// Reference of the residual, by body, under these internal forces. The trial state
