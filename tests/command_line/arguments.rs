@@ -80,7 +80,7 @@ fn refuses_results_where_none_can_be_written() {
         place.write("case.toml", CASE);
         let outcome = place.run(&["run", "case.toml", "--out", out]);
         assert_eq!(outcome.code, Some(BAD_INPUT), "{out}\n{}", outcome.stderr);
-        outcome.shows(&format!("cannot write {out}"));
+        outcome.shows(format!("cannot write {out}"));
         assert_eq!(place.contents(), ["case.toml", "file"]);
         assert_eq!(place.read("file"), "mine");
     }

@@ -449,7 +449,7 @@ fn an_interface_does_not_outlive_its_pile() {
         .shows(
             "interface `lower` is active and the ground on one of its sides, group `foot`, is not",
         )
-        .shows(&format!("pile.toml:{line}:"))
+        .shows(format!("pile.toml:{line}:"))
         .shows("`deactivate` has `lower` too");
 }
 

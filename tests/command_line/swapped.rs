@@ -99,7 +99,7 @@ fn internal_variables_of_another_law_with_the_same_id_are_not_read() {
         .expect("the swap");
     outcome
         .shows(is_said)
-        .shows(&format!("case.toml:{line}:"))
+        .shows(format!("case.toml:{line}:"))
         .shows("mohr_coulomb");
     // Far from its strength it is the elastic law, which has another id.
     let (outcome, expected) = run(to_zone("elastic", "solid", "zone"));
@@ -162,5 +162,5 @@ fn internal_variables_that_a_law_refuses_are_refused_before_the_first_increment(
     let outcome = place.refused_case(text);
     outcome
         .shows("stress_level is outside [0, 1]")
-        .shows(&format!("case.toml:{line}:"));
+        .shows(format!("case.toml:{line}:"));
 }

@@ -323,5 +323,5 @@ fn places_are_right_with_windows_line_endings() {
         .position(|line| line == "law = \"joint\"")
         .unwrap()
         + 1;
-    outcome.shows(&format!("case.toml:{line}:7"));
+    outcome.shows(format!("case.toml:{line}:7"));
 }

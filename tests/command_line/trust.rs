@@ -35,8 +35,8 @@ fn a_case_runs_only_with_the_library_it_names() {
     let outcome = place.run_case(pinned(&wrong)).ended(PLUGIN_TROUBLE);
     outcome
         .shows("law `elastic`: library")
-        .shows(&format!("found SHA-256 {right}"))
-        .shows(&format!("expected {wrong}"))
+        .shows(format!("found SHA-256 {right}"))
+        .shows(format!("expected {wrong}"))
         .shows("`sha256` at case.toml:29:10");
     assert_eq!(place.contents(), ["case.toml"]);
 
@@ -136,7 +136,7 @@ fn a_library_that_crashes_does_so_in_a_child() {
             outcome.stderr
         );
         assert!(outcome.says(says), "{define}: {}", outcome.stderr);
-        outcome.shows(&troubled::library());
+        outcome.shows(troubled::library());
     }
 }
 
@@ -150,7 +150,7 @@ fn without_a_probe_a_library_that_crashes_is_named() {
     let outcome = place
         .run(&["point", "driver.toml", "--csv", "out.csv", "--no-probe"])
         .ended(PLUGIN_TROUBLE);
-    outcome.shows(&troubled::library());
+    outcome.shows(troubled::library());
 }
 
 #[test]

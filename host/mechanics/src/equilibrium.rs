@@ -12,7 +12,7 @@ pub use continuation::{Clock, Measure};
 pub use mechanism::Mechanism;
 pub use newton::{
     Costs, Criterion, Culprit, DomainFailure, Equations, Guess, Imbalance, Iteration, Iterations,
-    Loads, Matrix, Motion, Newton, Open, PointPlace, Reason, Runaway, Singularity, StepFailure,
-    StepSuccess, Symptom, Unmet,
+    LedBy, Loads, Matrix, Motion, Newton, Open, PointPlace, Reason, Runaway, Singularity,
+    StepFailure, StepSuccess, Symptom, Unmet,
 };
 pub(crate) use newton::{ROUND_OFF, STILL_SMALL, norm};

@@ -3,16 +3,8 @@
 use super::{FILE, place};
 use crate::program::{BAD_INPUT, refuses_file};
 
-#[test]
-fn mistakes_are_told_with_file_line_and_key() {
-    let place = place();
-    let run = ["calibrate", "joint.toml", "--out", "out"];
-    refuses_file(
-        &place,
-        ("joint.toml", FILE),
-        &run,
-        BAD_INPUT,
-        r#"
+/// Edits of the file, and what the message says.
+const MISTAKES: &str = r#"
 starts = 2 => stars = 2
   joint.toml:2:
   unknown key `stars`
@@ -126,8 +118,13 @@ noise = 0.1\n => noise = 0.1\n[[stage]]\nname = "one"\nfree = ["friction_angle"]
   there is no test `bx`
 noise = 0.1\n => noise = 0.1\n[[stage]]\nname = "one"\nfree = []
   has no free parameter
-"#,
-    );
+"#;
+
+#[test]
+fn mistakes_are_told_with_file_line_and_key() {
+    let place = place();
+    let run = ["calibrate", "joint.toml", "--out", "out"];
+    refuses_file(&place, ("joint.toml", FILE), &run, BAD_INPUT, MISTAKES);
     let outcome = place.refused(&["calibrate", "driver.toml"]);
     outcome.shows("this is a driver or case file");
 }

@@ -16,7 +16,7 @@ mod viscous_motion;
 
 pub use arc_length::Measure;
 
-use super::newton::{Equilibrium, Guess, Loads, Newton, StepFailure, StepSuccess};
+use super::newton::{Equilibrium, Guess, LedBy, Loads, Newton, StepFailure, StepSuccess};
 use arc_length::ArcLength;
 use load_step::LoadControl;
 
@@ -113,8 +113,13 @@ impl Newton<'_> {
                 let viscous = &control.viscous;
                 let open = self.open(&equilibrium.state.balance, &iterations);
                 Ok(StepSuccess {
-                    relaxed: viscous.has_led_here(),
-                    regularised: control.regularised.has_begun(),
+                    led_by: if viscous.has_led_here() {
+                        LedBy::Viscous
+                    } else if control.regularised.has_begun() {
+                        LedBy::Regularised
+                    } else {
+                        LedBy::Newton
+                    },
                     was_kept: self.keeps(),
                     was_motion: viscous.lets_expect_another() || control.regularised.has_begun(),
                     open,
@@ -158,8 +163,7 @@ impl Equilibrium {
             increment: self.state.increment,
             iterations,
             unreliable: balance.unreliable,
-            relaxed: false,
-            regularised: false,
+            led_by: LedBy::Newton,
             was_kept: false,
             was_motion: false,
             round_off: self.round_off,

@@ -38,7 +38,7 @@ pub(super) use line_search::{LineSearch, Otherwise};
 pub use loads::Loads;
 pub use matrix::Matrix;
 pub(super) use matrix::noise;
-pub use outcome::{Costs, Guess, Iteration, Open, StepSuccess};
+pub use outcome::{Costs, Guess, Iteration, LedBy, Open, StepSuccess};
 pub(super) use residual::{Balance, Task};
 pub(super) use round_off::{ACCEPTED_ROUND_OFF, last_bit_scattered};
 pub(crate) use round_off::{ROUND_OFF, STILL_SMALL};

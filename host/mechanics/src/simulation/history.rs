@@ -109,6 +109,7 @@ impl History {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::equilibrium::LedBy;
 
     /// Steps of length 1 with these increments of one displacement, and what is guessed next.
     fn guess(increments: &[f64], length: f64) -> Option<f64> {
@@ -118,8 +119,7 @@ mod tests {
                 increment: vec![u],
                 iterations: Vec::new(),
                 unreliable: None,
-                relaxed: false,
-                regularised: false,
+                led_by: LedBy::Newton,
                 was_kept: false,
                 was_motion: false,
                 tolerated: 0.0,

@@ -8,7 +8,7 @@
 use super::phase::PhaseEquations;
 use super::{Simulation, UnderWay, Warning, Watch};
 use crate::assembly::fold;
-use crate::equilibrium::{Costs, Equations, Newton, StepSuccess, norm};
+use crate::equilibrium::{Costs, Equations, LedBy, Newton, StepSuccess, norm};
 use crate::error::Place;
 use crate::group::{Aside, Group};
 use crate::settings::{Control, Settings};
@@ -49,7 +49,7 @@ impl Simulation {
         (place, phase): (&Place, &mut UnderWay),
         watch: &mut dyn Watch,
     ) {
-        if success.regularised {
+        if success.led_by == LedBy::Regularised {
             phase.record.regularised += 1;
             if phase.record.regularised == 1 {
                 let other = self.neighbour(phase, success, step, Trial::Viscous);

@@ -5,7 +5,7 @@ use super::arc_length::PathEnd;
 use super::continuation::{self, Lead};
 use super::until::Verdict;
 use super::{Simulation, UnderWay, Warning, Watch, go_on, stopped};
-use crate::equilibrium::{Guess, Newton, StepFailure, StepSuccess};
+use crate::equilibrium::{Guess, LedBy, Newton, StepFailure, StepSuccess};
 use crate::error::{Error, Place};
 use crate::group::Group;
 use crate::settings::{Control, Settings};
@@ -117,11 +117,11 @@ impl Simulation {
         watch: &mut dyn Watch,
     ) -> Result<(), Error> {
         self.look_after(&success, (self.clock(phase.number), step), watch);
-        if success.relaxed || success.regularised {
+        if success.led_by != LedBy::Newton {
             self.note_motion(&success, step, way.lead.control, (way.place, phase), watch);
         }
         // Of a motion, and of what is tolerated, more is said already.
-        if way.was_cut && !success.relaxed && success.tolerated == 0.0 {
+        if way.was_cut && success.led_by != LedBy::Viscous && success.tolerated == 0.0 {
             self.note_cut_back(&success, step, (way.place, phase), watch);
         }
         way.lead.goes_on();

@@ -2,7 +2,7 @@
 //! stresses, else differences of these.
 
 use super::{Simulation, Warning, Watch};
-use crate::equilibrium::{Clock, StepFailure, StepSuccess};
+use crate::equilibrium::{Clock, LedBy, StepFailure, StepSuccess};
 use crate::group::{MadeBy, Went};
 use crate::settings::Tangents;
 
@@ -34,7 +34,7 @@ impl Simulation {
         let went = match success.iterations.len() {
             // What was committed on the way is not where the step began.
             _ if success.was_motion => return,
-            _ if success.tolerated > 0.0 || success.relaxed => Went::Badly,
+            _ if success.tolerated > 0.0 || success.led_by == LedBy::Viscous => Went::Badly,
             // Nor do tangents have to answer for corrections without them.
             _ if success.was_kept => return,
             n if n > TOO_MANY => Went::Badly,

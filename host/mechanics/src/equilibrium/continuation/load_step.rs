@@ -157,7 +157,7 @@ impl Control for LoadControl {
                 if self.has_settled(newton, state) {
                     return Err(failure);
                 }
-                if self.may_regularise() && !self.regularised.is_beyond() {
+                if self.may_regularise() {
                     self.regularised.has_tried_newton(false);
                     match self.regularised_from_least(newton, state, iterations) {
                         Err(failure) if failure.is_singular() => {}

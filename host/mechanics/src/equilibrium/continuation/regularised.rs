@@ -72,8 +72,6 @@ pub(super) struct Regularised {
     is_expected: bool,
     /// Number of the first regularised iteration, once there is one.
     since: Option<usize>,
-    /// The regularised matrix was singular.
-    is_beyond: bool,
     /// Viscous relaxation leads on in this step.
     pub(super) has_given_way: bool,
     /// The present state is an equilibrium by the rate of the corrections.
@@ -92,7 +90,6 @@ impl Regularised {
             halvings: 0,
             is_expected,
             since: None,
-            is_beyond: false,
             has_given_way: false,
             has_settled: false,
         }
@@ -107,11 +104,6 @@ impl Regularised {
     /// Whether Newton corrections are taken whole or not at all.
     pub(super) fn is_expected(&self) -> bool {
         self.is_expected || self.has_begun()
-    }
-
-    /// Whether even the last regularised matrix was singular.
-    pub(super) fn is_beyond(&self) -> bool {
-        self.is_beyond
     }
 
     /// Whether Newton iterations get on slowly.
@@ -212,9 +204,10 @@ impl Regularised {
     ) -> Result<(Iteration, State), StepFailure> {
         newton.tangents_at(&state.increment, task)?;
         let share = SHARE;
-        self.is_beyond = true;
+        // If even that matrix is singular.
+        self.has_given_way = true;
         newton.factorise_regularised(&self.elastic, share)?;
-        self.is_beyond = false;
+        self.has_given_way = false;
         let plain = newton.regularised_answer(&state.balance.residual, share)?;
         let size = norm(&plain);
         let (cosine, ratio) = (self.cosine(&plain), size / norm(&self.last));

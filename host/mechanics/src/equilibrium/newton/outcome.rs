@@ -51,6 +51,17 @@ impl Iteration {
     }
 }
 
+/// What led a step to equilibrium.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LedBy {
+    /// Newton iterations alone.
+    Newton,
+    /// Regularised corrections, where these got on slowly.
+    Regularised,
+    /// A viscous motion, where they had come to a standstill.
+    Viscous,
+}
+
 /// A step that reached equilibrium. The groups' trial state is that of equilibrium.
 #[derive(Clone, Debug)]
 pub struct StepSuccess {
@@ -60,10 +71,8 @@ pub struct StepSuccess {
     pub iterations: Vec<Iteration>,
     /// Points whose laws call their result inaccurate.
     pub unreliable: Option<String>,
-    /// Newton iterations alone had come to a standstill; viscous relaxation led to this state.
-    pub relaxed: bool,
-    /// Regularised corrections led to this state.
-    pub regularised: bool,
+    /// What led to this state.
+    pub led_by: LedBy,
     /// Corrections with the matrix of an earlier step led to it.
     pub was_kept: bool,
     /// It took many viscous steps.
