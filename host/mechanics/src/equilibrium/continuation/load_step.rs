@@ -4,7 +4,7 @@
 //! state; slow corrections are accelerated.
 
 use super::STEP_LENGTHS;
-use super::regularised::{Regularised, newton_leaves};
+use super::regularised::{Regularised, STILL_MOVES, newton_leaves};
 use super::viscous::{Viscous, stands_still};
 use crate::equilibrium::newton::{
     Acceleration, Control, Correction, Iteration, LineSearch, Newton, Otherwise, State,
@@ -13,10 +13,9 @@ use crate::equilibrium::newton::{
 use crate::settings::Method;
 use law::Operator;
 
-/// A residual is tolerated only if none of this many last corrections was larger than this, relative to the
+/// A residual is tolerated only if none of this many last corrections was larger than [`STILL_MOVES`], relative to the
 /// increment: what moves on is a mechanism, however small its residual.
 const LAST: usize = 5;
-const STILL_MOVES: f64 = 0.1;
 /// It is not tolerated if the displacement increments are more than this many times those at the start of the
 /// iterations.
 const FAR: f64 = 5.0;

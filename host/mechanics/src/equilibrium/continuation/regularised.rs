@@ -14,7 +14,7 @@
 //! tolerance. A whole Newton correction of that state must not be larger than the increment: it sees a mode that
 //! regularised corrections follow slowly. A body that moves on at constant speed (ρ = 1: a mechanism, until other points
 //! yield or unload) is in no equilibrium, however small its residual. It is followed by long moves along the same
-//! correction.
+//! correction. Where they lead no further, viscous relaxation follows in the same step.
 
 use crate::equilibrium::newton::{
     Acceleration, Control, Correction, Iteration, Newton, State, StepFailure, Task, dot, norm,
@@ -47,13 +47,13 @@ const HELD: f64 = 1.0;
 /// Regularised corrections of a step, and those without a gain of a tenth that are a standstill.
 const MOST: usize = 80;
 const STANDSTILL: usize = 60;
+const GAIN: f64 = 0.9;
 /// The residual falls too slowly if at its rate over this many corrections it would not meet its tolerance within those
 /// that are left to the step.
 const WINDOW: usize = 12;
-/// A body moves on as a mechanism if so many corrections are all larger than this, relative to the increment, without a
-/// gain of a tenth.
-const STILL_MOVES: f64 = 0.1;
-const GAIN: f64 = 0.9;
+/// A body moves on as a mechanism if all corrections of that window are larger than this, relative to the increment, and
+/// the residual does not fall by a tenth.
+pub(super) const STILL_MOVES: f64 = 0.1;
 
 /// Regularised iterations of a step.
 #[derive(Debug)]
@@ -166,7 +166,7 @@ impl Regularised {
         }
     }
 
-    /// Whether they have come to their end: too many, a standstill, or a residual that falls too slowly.
+    /// Whether they have come to their end: too many, a standstill, a residual that falls too slowly, or a mechanism.
     pub(super) fn is_over(&self, settings: &Settings, iterations: &[Iteration]) -> bool {
         let Some(series) = self.since.and_then(|since| iterations.get(since..)) else {
             return false;
