@@ -215,3 +215,27 @@ fn ground_of_20_degrees_with_half_the_dilatancy() {
         "{below} < {half} < {associated}"
     );
 }
+
+#[test]
+fn a_tolerance_of_the_active_load_does_not_know_the_weight_of_the_ground() {
+    // Equal stress in all directions changes nothing for Tresca, so the exact answer is that without weight.
+    let pressures = |weight: f64, of: &str, tolerance: f64| {
+        let heavy = format!(
+            "law = \"ground\", unit_weight = {weight:?}, initial_stress = {{ k_0 = 1.0 }} }}"
+        );
+        let ground = text(Footing { n: 4, ..TRESCA }).replace("law = \"ground\" }", &heavy);
+        let finished = run(&format!(
+            "{ground}\n[solver]\nforce_tolerance = {tolerance:?}\ndisplacement_tolerance = 1.0\ntolerance_of = \"{of}\"\n"
+        ));
+        finished.history("pressure")
+    };
+    let exact = pressures(1e-3, "active_load", 1e-9);
+    let error = |of| {
+        let pairs = pressures(1e4, of, 1e-3).into_iter().zip(&exact);
+        let errors = pairs.map(|(pressure, exact)| (pressure / exact - 1.0).abs());
+        errors.fold(0.0, f64::max)
+    };
+    let (of_load, of_all) = (error("active_load"), error("forces_in_play"));
+    assert!(of_load < 2e-3, "{of_load:.1e}");
+    assert!(of_all > 0.01, "{of_all:.1e}");
+}

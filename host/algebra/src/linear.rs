@@ -333,9 +333,24 @@ impl LinearSolver {
         dense::factorise(matrix, &mut self.exchanges)
     }
 
-    /// Factorises with full row exchanges.
+    /// Whether an equation outside the block has no entry but zeros.
+    fn has_empty_column(&self) -> bool {
+        let in_block = |column: usize| {
+            let mut blocks = self.block.iter();
+            blocks.any(|block| block.equations.binary_search(&column).is_ok())
+        };
+        (0..self.pattern.n()).any(|column| {
+            let mut values = self.values[self.pattern.places(column)].iter();
+            values.all(|value| *value == 0.0) && !in_block(column)
+        })
+    }
+
+    /// Factorises with full row exchanges, which take several times the memory.
     fn fall_back(&mut self) -> Result<(), Singular> {
         self.factorised = false;
+        if self.has_empty_column() {
+            return Err(Singular);
+        }
         self.fallbacks += 1;
         self.multifrontal.forget();
         let (pattern, values) = self.with_block_entries();
@@ -588,6 +603,17 @@ mod tests {
             }
             assert_eq!(fallen_back, fallbacks);
         }
+    }
+
+    #[test]
+    fn an_equation_without_entries_is_singular_without_a_fallback() {
+        let mut solver = LinearSolver::new(&two_by_two(), false, None).unwrap();
+        assert!(solver.factorise(vec![0.0, 0.0, 2.0, 4.0]).is_err());
+        assert!(solver.solve(&[1.0, 1.0]).is_err());
+        assert_eq!(solver.fallbacks, 0);
+        // The next matrix is one again.
+        solver.factorise(vec![1.0, 0.0, 0.0, 1.0]).unwrap();
+        assert_eq!(solver.solve(&[1.0, 2.0]).unwrap(), [1.0, 2.0]);
     }
 
     #[test]

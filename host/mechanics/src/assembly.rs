@@ -325,6 +325,19 @@ impl System {
         !self.elements[group].is_empty()
     }
 
+    /// Nodal forces of the stresses that the groups start from, by degree of freedom; before ties.
+    pub fn carried(&self, groups: &[Group]) -> Vec<f64> {
+        let mut forces = vec![0.0; self.n_dofs()];
+        for (_, group) in groups
+            .iter()
+            .enumerate()
+            .filter(|(number, _)| self.includes(*number))
+        {
+            group.kinematics.add_forces(&group.carried(), &mut forces);
+        }
+        forces
+    }
+
     /// Degrees of freedom of a group's elements, after ties; some of them several times.
     pub fn dofs_of(&self, group: usize) -> impl Iterator<Item = usize> {
         self.elements[group]

@@ -13,7 +13,7 @@ pub struct Settings {
     pub method: Method,
     /// Source of the laws' tangents.
     pub tangents: Tangents,
-    /// Largest residual over the largest of the forces in play (2-norms).
+    /// Largest residual over the forces that `tolerance_of` names (2-norms).
     #[serde(deserialize_with = "tolerance")]
     pub force_tolerance: f64,
     /// Largest correction over the displacement increment (2-norms).
@@ -24,6 +24,8 @@ pub struct Settings {
     /// 0: none.
     #[serde(deserialize_with = "tolerated")]
     pub tolerated_residual: f64,
+    /// Forces that the residual is measured against.
+    pub tolerance_of: ToleranceOf,
     /// Criterion of equilibrium.
     pub convergence: Convergence,
     /// Iterations before a cut-back; default: 25 for `auto` and `newton`, 200 for `modified_newton`,
@@ -110,6 +112,7 @@ impl Default for Settings {
             force_tolerance: 1e-9,
             displacement_tolerance: 1e-7,
             tolerated_residual: 1e-3,
+            tolerance_of: ToleranceOf::ForcesInPlay,
             convergence: Convergence::Both,
             max_iterations: None,
             max_halvings: 10,
@@ -179,6 +182,28 @@ pub enum Tangents {
     Law,
     /// Differences of the stresses of all nonlinear laws.
     Differences,
+}
+
+/// Forces that the residual is measured against.
+#[derive(Clone, Copy, Debug, Default, Deserialize, JsonSchema, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ToleranceOf {
+    /// All forces in play; of ground, its weight is the largest part.
+    #[default]
+    ForcesInPlay,
+    /// The change of nodal forces and reactions since the start of the phase: that of a pile load, not of the weight
+    /// of the ground around it.
+    ActiveLoad,
+}
+
+impl ToleranceOf {
+    /// Its words in messages.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::ForcesInPlay => "forces in play",
+            Self::ActiveLoad => "active load",
+        }
+    }
 }
 
 /// Tolerances of a state.

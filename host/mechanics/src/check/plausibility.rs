@@ -178,8 +178,9 @@ fn loose(problem: &Problem) -> Option<String> {
     let tolerance = problem.settings.force_tolerance;
     (tolerance > LOOSE).then(|| {
         format!(
-            "`force_tolerance` = {tolerance} in [solver]: up to {:.0} % of the forces in play may be out of balance",
-            100.0 * tolerance
+            "`force_tolerance` = {tolerance} in [solver]: up to {:.0} % of the {} may be out of balance",
+            100.0 * tolerance,
+            problem.settings.tolerance_of.words()
         )
     })
 }

@@ -94,6 +94,8 @@ pub struct Newton<'a> {
 pub(super) struct Start {
     /// Forces of the domain at the end of the step if its boundary stays where it is.
     domain_forces: Vec<f64>,
+    /// Nodal forces at the start of the phase, by place, if residuals are measured against their change.
+    carried: Vec<f64>,
     /// Displacement increments of the step that are committed already, by place; when what is left of it starts, and
     /// how long that takes.
     pub(super) base: Option<(Vec<f64>, (f64, f64))>,
@@ -179,6 +181,13 @@ impl<'a> Newton<'a> {
         };
         self.reference = Reference::at_start(at_start);
         self.start.base = None;
+        self.start.carried = if loads.carried.is_empty() {
+            Vec::new()
+        } else {
+            let mut carried = self.equations.places.gather(&loads.carried);
+            self.equations.places.fold(&mut carried);
+            carried
+        };
         self.begin();
     }
 }

@@ -183,6 +183,7 @@ impl Simulation {
             out_of_balance: last.out_of_balance,
             scale: last.scale,
             largest: last.largest,
+            carried: last.carried,
             ..next
         };
         // What the last steps did says nothing of a course that may have turned.

@@ -315,6 +315,11 @@ impl Simulation {
             let beside = domain.as_ref().zip(internal.as_deref());
             self.out_of_balance(&unknowns, beside, &mut loads)
         };
+        if course.is_none()
+            && self.problem.settings.tolerance_of == settings::ToleranceOf::ActiveLoad
+        {
+            loads.carried = system.carried(&self.groups);
+        }
         let tolerance = self.problem.settings.force_tolerance;
         if let Some(domain) = &mut domain {
             if let Some(standing) = standing {

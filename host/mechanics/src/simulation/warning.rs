@@ -218,7 +218,7 @@ impl fmt::Display for Warning {
                 force,
             } => write!(
                 f,
-                "phase `{phase}`: {steps} steps have a tolerated residual, at most {largest:.1e} of the forces in play, {force:.1e} kN"
+                "phase `{phase}`: {steps} steps have a tolerated residual, at most {force:.1e} kN ({largest:.1e})"
             ),
             Self::Tolerated {
                 place,

@@ -27,6 +27,10 @@ pub struct Loads {
     /// The same at every degree of freedom.
     #[serde(with = "crate::numbers")]
     pub largest: Vec<f64>,
+    /// Nodal forces of the stresses in the iterated groups at the start of the phase, if residuals are measured against
+    /// their change.
+    #[serde(with = "crate::numbers")]
+    pub carried: Vec<f64>,
 }
 
 impl Default for Loads {
@@ -39,6 +43,7 @@ impl Default for Loads {
             out_of_balance: Vec::new(),
             scale: 0.0,
             largest: Vec::new(),
+            carried: Vec::new(),
         }
     }
 }

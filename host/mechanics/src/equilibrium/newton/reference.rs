@@ -257,14 +257,8 @@ impl Newton<'_> {
         if let Some(last) = &self.reference.last {
             return last.clone();
         }
-        for (number, group) in self.groups.iter().enumerate() {
-            if self.equations.system.includes(number) {
-                group
-                    .kinematics
-                    .add_forces(&group.carried(), &mut self.room.force);
-            }
-        }
-        let mut internal = self.equations.places.take(&mut self.room.force);
+        let carried = self.equations.system.carried(self.groups);
+        let mut internal = self.equations.places.gather(&carried);
         self.equations.places.fold(&mut internal);
         let committed = |group: &Group, _: usize| group.carried().into_owned();
         let last = self.forces_by_body(&internal, &committed);

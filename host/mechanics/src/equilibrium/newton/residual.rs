@@ -1,5 +1,6 @@
 //! Evaluation: what displacement increments leave out of balance.
 
+use super::acceptance::EXACT;
 use super::{Newton, ROUND_OFF};
 use crate::assembly::norms;
 use crate::group::{Committed, Group, PointFailure};
@@ -81,7 +82,15 @@ impl Newton<'_> {
         let trial = |group: &Group, _: usize| group.carried_on_trial().into_owned();
         let in_play = self.forces_by_body(&internal, &trial);
         let floors = self.floors(increment, task);
-        let (scales, has_moved) = self.scales(&in_play, &floors, task);
+        let active = self.active_load(&internal);
+        let (mut scales, has_moved) = self.scales(&in_play, &floors, task);
+        if let Some(active) = active {
+            // What rounding leaves of all forces counts as exact.
+            let least = ROUND_OFF / (EXACT * self.settings.force_tolerance);
+            for scale in &mut scales {
+                *scale = active.clamp(least.min(1.0) * *scale, *scale);
+            }
+        }
         if has_moved {
             (internal, unreliable) = self.internal_forces(increment, task, operator)?;
         }
@@ -115,6 +124,14 @@ impl Newton<'_> {
             away,
             unreliable,
         })
+    }
+
+    /// Norm of the change of nodal forces, by place and without those of the domain, since the start of the phase; if
+    /// residuals are measured against it.
+    fn active_load(&self, internal: &[f64]) -> Option<f64> {
+        let carried = self.start.carried.as_slice();
+        let changes = internal.iter().zip(carried).map(|(now, start)| now - start);
+        (!carried.is_empty()).then(|| changes.map(|change| change * change).sum::<f64>().sqrt())
     }
 
     /// Takes note of the interfaces of which a point opens in the trial state.

@@ -48,7 +48,7 @@ part(() => {
     if (tolerance) series.push({ name: 'tolerance', x: [0, n], y: [tolerance, tolerance], colour: 4, dash: [6, 4], width: 1, silent: true });
     if (cut.x.length) series.push({ name: 'cut-back', x: cut.x, y: cut.y, colour: 1, line: false, points: true, radius: 4.5, tip: i => cut.tips[i] });
     title.textContent = `${isComparison ? state.run.name + ': ' : ''}${n} iterations in ${attempts} steps, ${cut.x.length} cut back`;
-    chart.set({ x: { label: 'iteration, counted through' }, y: { label: 'residual / forces in play', log: true }, series });
+    chart.set({ x: { label: 'iteration, counted through' }, y: { label: 'relative residual', log: true }, series });
   };
   const phaseHost = make('span', {});
   const fill = () => {
