@@ -276,3 +276,42 @@ e_22 = {{ group = "upper", quantity = "strain_22" }}
     );
     assert_close("σ", done.last("s_22"), 0.0, EQUILIBRIUM, YOUNG * STRAIN);
 }
+
+#[test]
+fn a_phase_that_changes_nothing_leaves_a_free_block_where_it_is() {
+    // Only what rounding leaves of the expansion is out of balance.
+    for columns in [2, 6, 8] {
+        let (young, strain) = (30e6, -1e-4);
+        let finished = run(&format!(
+            r#"
+analysis = "plane_strain"
+supports = [{{ line = "bottom", fixed = ["y"] }}, {{ line = "left", fixed = ["x"] }}]
+[mesh]
+columns = [{{ n = {columns}, to = 2.0 }}]
+rows = [{{ n = 4, to = 5.0 }}]
+region = [{{ group = "block" }}]
+lines.left = {{ x = 0.0 }}
+lines.bottom = {{ y = 0.0 }}
+lines.top = {{ y = 5.0 }}
+[laws]
+{}
+[groups]
+block = {{ formulation = "solid", law = "block" }}
+[[phase]]
+name = "warm"
+increments = 3
+strain = {{ block = {strain} }}
+[[phase]]
+name = "nothing"
+increments = 2
+[probes]
+up = {{ line = "top", quantity = "displacement_y" }}
+"#,
+            elastic("block", young, POISSON),
+        ));
+        for up in finished.in_phase("nothing", "up") {
+            let expected = 5.0 * strain * (1.0 + POISSON);
+            assert_close("up", up, expected, EQUILIBRIUM, expected.abs());
+        }
+    }
+}

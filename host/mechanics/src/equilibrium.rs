@@ -15,4 +15,4 @@ pub use newton::{
     LedBy, Loads, Matrix, Motion, Newton, Open, PointPlace, Reason, Runaway, Singularity,
     StepFailure, StepSuccess, Symptom, Unmet,
 };
-pub(crate) use newton::{ROUND_OFF, STILL_SMALL, norm};
+pub(crate) use newton::{ROUND_OFF, STILL_SMALL, norm, reference_of_round_off};

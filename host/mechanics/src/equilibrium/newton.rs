@@ -41,7 +41,7 @@ pub(super) use matrix::noise;
 pub use outcome::{Costs, Guess, Iteration, LedBy, Open, StepSuccess};
 pub(super) use residual::{Balance, Task};
 pub(super) use round_off::{ACCEPTED_ROUND_OFF, last_bit_scattered};
-pub(crate) use round_off::{ROUND_OFF, STILL_SMALL};
+pub(crate) use round_off::{ROUND_OFF, STILL_SMALL, reference_of_round_off};
 
 use super::condensation::LinearDomain;
 use crate::assembly::{Places, System, norms};

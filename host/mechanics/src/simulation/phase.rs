@@ -6,7 +6,9 @@ use super::state::PhaseCourse;
 use super::{PhaseRecord, Simulation, UnderWay, Warning, Watch};
 use crate::assembly::{Bodies, Places, System, fold};
 use crate::element::Kinematics;
-use crate::equilibrium::{Costs, Equations, Held, LinearDomain, Loads, Matrix, Newton, ROUND_OFF};
+use crate::equilibrium::{
+    Costs, Equations, Held, LinearDomain, Loads, Matrix, Newton, reference_of_round_off,
+};
 use crate::error::Error;
 use crate::group::Group;
 use crate::problem::Axis;
@@ -302,7 +304,9 @@ impl Simulation {
         let condensed = self.condensed(number, is_prescribed);
         self.reuse.forget();
         let (system, mut domain, solver) = self.unknowns(condensed, is_prescribed)?;
-        let bytes = solver.bytes() + system.bytes_of_elements(&self.groups);
+        // A matrix, the one before it, and the elastic one of regularised corrections.
+        let matrices = 3 * size_of::<f64>() * system.pattern.rows.len();
+        let bytes = solver.bytes() + system.bytes_of_elements(&self.groups) + matrices as u64;
         self.reuse.announce(bytes, "factorising the equations");
         let of_domain = domain.iter().flat_map(LinearDomain::unknowns);
         let unknowns = among_both(system.free(), of_domain, system.n_dofs());
@@ -481,7 +485,8 @@ impl Simulation {
             play += f64::max(internal * internal, external * external);
         }
         // Where nothing is left of earlier forces, what remains of them is round-off.
-        let left_of = |earlier: f64| ROUND_OFF * earlier / self.problem.settings.force_tolerance;
+        let tolerance = self.problem.settings.force_tolerance;
+        let left_of = |earlier: f64| reference_of_round_off(earlier, tolerance);
         let now = f64::sqrt(play);
         loads.scale = now.max(left_of(self.largest_force));
         let both = internal.iter().zip(&loads.force_start);

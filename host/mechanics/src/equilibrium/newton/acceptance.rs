@@ -14,7 +14,7 @@
 //! neighbour or from a stiffness that grows with pressure. A factor of ten ([`FORCES`]) leaves room for them, and costs
 //! at most one digit of the tolerance. If the forces rise farther in one step, the criterion is only stricter.
 
-use super::round_off::ROUND_OFF;
+use super::round_off::exact;
 
 /// The displacement criterion is waived where the residual is this far below its tolerance: a
 /// linear step ends after one correction, which is as large as the increment itself.
@@ -104,12 +104,12 @@ pub(super) struct Measures {
 }
 
 impl Measures {
-    /// Whether the residual is so small that the correction adds no information. If the tolerance is near round-off of
-    /// the forces in play, such a residual counts too: in a body that need not move, the increment is also round-off
-    /// and does not measure corrections.
+    /// Whether the residual is [exact], and the body where it can be expected.
     pub(super) fn is_exact(&self, criteria: Criteria) -> bool {
-        let exact = (EXACT * criteria.force).max(ROUND_OFF.min(criteria.force));
-        !criteria.is_stale && self.residual <= exact && self.beyond <= MOVES && !self.is_away
+        !criteria.is_stale
+            && self.residual <= exact(criteria.force)
+            && self.beyond <= MOVES
+            && !self.is_away
     }
 
     /// Whether the body is in equilibrium.

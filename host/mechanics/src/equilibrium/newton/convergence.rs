@@ -172,7 +172,9 @@ impl Newton<'_> {
     ) -> Unmet {
         let residual_tolerance = self.settings.force_tolerance;
         Unmet {
-            failed: if balance.relative <= residual_tolerance {
+            failed: if balance.away.contains(&true) {
+                Criterion::Distance
+            } else if balance.relative <= residual_tolerance {
                 Criterion::Correction
             } else {
                 Criterion::Residual

@@ -10,6 +10,8 @@ use serde::Serialize;
 /// A criterion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Criterion {
+    /// Displacements that do not run away.
+    Distance,
     /// The forces out of balance.
     Residual,
     /// The last correction of the displacements.
@@ -19,7 +21,7 @@ pub enum Criterion {
 /// How far a state is from equilibrium.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unmet {
-    /// The criterion that is not met; the residual's, if neither is.
+    /// The criterion that is not met; the first of them.
     pub failed: Criterion,
     /// Relative residual.
     pub residual: f64,

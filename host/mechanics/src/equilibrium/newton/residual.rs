@@ -1,7 +1,6 @@
 //! Evaluation: what displacement increments leave out of balance.
 
-use super::acceptance::EXACT;
-use super::{Newton, ROUND_OFF};
+use super::{Newton, ROUND_OFF, reference_of_round_off};
 use crate::assembly::norms;
 use crate::group::{Committed, Group, PointFailure};
 use law::Operator;
@@ -85,10 +84,9 @@ impl Newton<'_> {
         let active = self.active_load(&internal);
         let (mut scales, has_moved) = self.scales(&in_play, &floors, task);
         if let Some(active) = active {
-            // What rounding leaves of all forces counts as exact.
-            let least = ROUND_OFF / (EXACT * self.settings.force_tolerance);
             for scale in &mut scales {
-                *scale = active.clamp(least.min(1.0) * *scale, *scale);
+                let least = reference_of_round_off(*scale, self.settings.force_tolerance);
+                *scale = active.clamp(least.min(*scale), *scale);
             }
         }
         if has_moved {

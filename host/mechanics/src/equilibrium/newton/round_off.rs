@@ -1,6 +1,7 @@
 //! What rounding leaves of forces that should cancel.
 
 use super::Newton;
+use super::acceptance::EXACT;
 use super::outcome::Iteration;
 use super::residual::{Balance, Task};
 use crate::assembly::norms;
@@ -13,6 +14,18 @@ pub(crate) const STILL_SMALL: f64 = 1e-6;
 pub(in crate::equilibrium) const ACCEPTED_ROUND_OFF: f64 = 8.0;
 /// Round-off of K u, relative to the forces it is the difference of.
 pub(crate) const ROUND_OFF: f64 = 64.0 * f64::EPSILON;
+
+/// Relative residual so small that the last correction adds no information. If the tolerance is near round-off of the
+/// forces in play, that is round-off: in a body that need not move, the increment is round-off too and does not measure
+/// corrections.
+pub(super) fn exact(force_tolerance: f64) -> f64 {
+    (EXACT * force_tolerance).max(ROUND_OFF.min(force_tolerance))
+}
+
+/// The reference of a residual for which what rounding leaves of these forces is exact.
+pub(crate) fn reference_of_round_off(forces: f64, force_tolerance: f64) -> f64 {
+    ROUND_OFF / exact(force_tolerance) * forces
+}
 
 impl Newton<'_> {
     /// Whether a small residual is one that the last bit of the displacement increments makes, so

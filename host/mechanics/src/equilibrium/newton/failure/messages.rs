@@ -29,6 +29,7 @@ impl fmt::Display for Unmet {
         match self.failed {
             Criterion::Residual => write!(f, "{residual}; {correction}"),
             Criterion::Correction => write!(f, "{correction}; {residual}"),
+            Criterion::Distance => write!(f, "displacements ran away"),
         }
     }
 }
