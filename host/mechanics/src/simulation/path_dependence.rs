@@ -33,6 +33,8 @@ pub enum Neighbour {
         displacements: f64,
         /// The distance of the changes of forces.
         forces: f64,
+        /// The largest difference of a displacement (m) and of a nodal force (kN).
+        largest: [f64; 2],
     },
     /// To no equilibrium.
     None,
@@ -149,6 +151,10 @@ impl Simulation {
                 Some(Neighbour::Apart {
                     displacements: apart(&other.increment, &success.increment, None, 0.0),
                     forces: apart(&there, &here, Some(&before), least),
+                    largest: [
+                        largest_difference(&other.increment, &success.increment),
+                        largest_difference(&there, &here),
+                    ],
                 })
             }
             Ok(_) => Some(Neighbour::None),
@@ -190,17 +196,38 @@ const MOST_HALVED: usize = 4;
 const SAME: f64 = 1e-6;
 
 impl Neighbour {
+    /// How far it is from the state that the step ended in, in words.
+    pub(super) fn distance(self) -> String {
+        match self {
+            Self::Apart {
+                displacements,
+                forces,
+                largest: [displacement, force],
+            } => format!(
+                "at most {displacement:.1e} m and {force:.1e} kN at a node; {displacements:.1e} and {forces:.1e} of what the \
+                 step changes"
+            ),
+            Self::None => String::new(),
+        }
+    }
+
     /// Whether it is the state that the step ended in.
     pub(super) fn is_the_same(self) -> bool {
         let Self::Apart {
             displacements,
             forces,
+            ..
         } = self
         else {
             return false;
         };
         displacements.max(forces) <= SAME
     }
+}
+
+fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+    let differences = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+    differences.fold(0.0, f64::max)
 }
 
 /// ‖a − b‖ / ‖b − start‖, or over what the change is at `least`.

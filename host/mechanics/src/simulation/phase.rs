@@ -304,8 +304,8 @@ impl Simulation {
         let condensed = self.condensed(number, is_prescribed);
         self.reuse.forget();
         let (system, mut domain, solver) = self.unknowns(condensed, is_prescribed)?;
-        // A matrix, the one before it, and the elastic one of regularised corrections.
-        let matrices = 3 * size_of::<f64>() * system.pattern.rows.len();
+        // A matrix and the one before it.
+        let matrices = 2 * size_of::<f64>() * system.pattern.rows.len();
         let bytes = solver.bytes() + system.bytes_of_elements(&self.groups) + matrices as u64;
         self.reuse.announce(bytes, "factorising the equations");
         let of_domain = domain.iter().flat_map(LinearDomain::unknowns);

@@ -353,13 +353,7 @@ fn cut_back(f: &mut fmt::Formatter<'_>, place: &Place, in_halves: Neighbour) -> 
         "{place}: results depend on the step size: the same step in two halves "
     )?;
     match in_halves {
-        Neighbour::Apart {
-            displacements,
-            forces,
-        } => write!(
-            f,
-            "differs by {displacements:.1e} in displacements and {forces:.1e} in forces, as shares of the step"
-        )?,
+        Neighbour::Apart { .. } => write!(f, "differs by {}", in_halves.distance())?,
         Neighbour::None => write!(f, "finds no equilibrium")?,
     }
     write!(f, ". Compare with a run with more increments")
@@ -376,6 +370,7 @@ fn stalled(
         Some(Neighbour::Apart {
             displacements,
             forces,
+            ..
         }) if by_viscous_control.is_some_and(Neighbour::is_the_same) => {
             return write!(
                 f,
@@ -383,13 +378,10 @@ fn stalled(
                 displacements.max(forces)
             );
         }
-        Some(Neighbour::Apart {
-            displacements,
-            forces,
-        }) => write!(
+        Some(other @ Neighbour::Apart { .. }) => write!(
             f,
-            "{place}: {found} an equilibrium; viscous control finds one that differs by {displacements:.1e} of the step's \
-             displacements and {forces:.1e} of its changes of forces"
+            "{place}: {found} an equilibrium; viscous control finds one that differs by {}",
+            other.distance()
         )?,
         Some(Neighbour::None) => write!(
             f,
@@ -450,6 +442,7 @@ mod tests {
             of(Some(Neighbour::Apart {
                 displacements,
                 forces,
+                largest: [2e-4, 0.3],
             }))
         };
         let same = apart(3e-13, 2e-8);
@@ -471,11 +464,10 @@ mod tests {
         let apart = of(Neighbour::Apart {
             displacements: 2e-3,
             forces: 5e-4,
+            largest: [1e-6, 0.7],
         });
-        assert!(
-            apart.contains("by 2.0e-3 in displacements and 5.0e-4 in forces"),
-            "{apart}"
-        );
+        let distance = "by at most 1.0e-6 m and 7.0e-1 kN at a node; 2.0e-3 and 5.0e-4 of what the step changes";
+        assert!(apart.contains(distance), "{apart}");
         let none = of(Neighbour::None);
         assert!(none.contains("finds no equilibrium"), "{none}");
     }

@@ -497,7 +497,13 @@ fn in_halves(neighbour: Option<Neighbour>) -> Value {
         Some(Neighbour::Apart {
             displacements,
             forces,
-        }) => json!({ "displacements": displacements, "forces": forces }),
+            largest: [displacement, force],
+        }) => json!({
+            "displacements": displacements,
+            "forces": forces,
+            "largest_displacement": displacement,
+            "largest_force": force,
+        }),
         Some(Neighbour::None) => json!("no equilibrium"),
         None => Value::Null,
     }
