@@ -4,7 +4,7 @@
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use crate::good::passes;
-use crate::program::{check, folder, pilum_in};
+use crate::program::{check, compiled_from, folder, pilum_in};
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -54,6 +54,26 @@ fn laws_in_other_languages_pass() {
             // A Fortran library has no manifest, which says nothing of the law.
             passes(&library);
         }
+    }
+}
+
+/// Neither C nor C++ reserve `y0`, which libm has, too.
+#[test]
+fn a_law_calls_its_own_functions() {
+    let folder = folder();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let law = std::fs::read_to_string(root.join("models/foreign/coulomb_joint.c")).unwrap();
+    let own = "#pragma GCC visibility push(default)\ndouble y0(double stiffness);\n\
+               double y0(double stiffness) { return stiffness; }\n#pragma GCC visibility pop\n";
+    let calls = law.replace(".k_t = p[1]", ".k_t = y0(p[1])");
+    assert_ne!(law, calls);
+    let source = folder.path().join("own.c");
+    std::fs::write(&source, format!("{own}{calls}")).unwrap();
+    let include = root.join("abi/include");
+    if let Some(library) = compiled_from(&source, &include, folder.path()) {
+        let report = check(&library, &["--only", "units-belong-together"]);
+        let finding = report.check("units-belong-together");
+        assert_eq!(finding["outcome"], "passed", "{finding}");
     }
 }
 

@@ -175,8 +175,8 @@ unsafe fn load_image(
     Ok(library)
 }
 
-/// Loads a file of the library at `path`. One that `is_private` finds its own symbols first: a routine that brings its
-/// own `sprind` uses that one, and the program's is there for the others.
+/// Loads a file of the library at `path`. It finds its own symbols first: a law with a function `gamma` or `y0` means
+/// that one, not libm's, and a routine that brings its own `sprind` not the program's.
 #[cfg(unix)]
 unsafe fn load(
     file: &Path,
@@ -187,10 +187,10 @@ unsafe fn load(
     let mut flags = RTLD_NOW | RTLD_LOCAL;
     if is_private {
         abaqus::keep();
-        if cfg!(all(target_os = "linux", target_env = "gnu")) {
-            const RTLD_DEEPBIND: std::ffi::c_int = 8;
-            flags |= RTLD_DEEPBIND;
-        }
+    }
+    if cfg!(all(target_os = "linux", target_env = "gnu")) {
+        const RTLD_DEEPBIND: std::ffi::c_int = 8;
+        flags |= RTLD_DEEPBIND;
     }
     // SAFETY: passed on to the caller.
     apart(path, || unsafe { Library::open(Some(file), flags) }).map(Into::into)
