@@ -78,17 +78,14 @@ pub(crate) struct System<'a> {
 }
 
 impl<'a> System<'a> {
+    /// No active surface yet.
     #[inline]
-    pub(crate) fn new(soil: &'a Soil, trial: Trial, zone: Zone, hardening: Hardening) -> Self {
-        let a = soil.cap.gradient(
-            zone.merged == Merged::First12,
-            zone.merged == Merged::Last23,
-        );
-        let mut system = Self {
+    pub(crate) fn new(soil: &'a Soil, trial: Trial) -> Self {
+        Self {
             soil,
             trial,
-            zone,
-            a,
+            zone: Zone::ELASTIC,
+            a: [0.0; 3],
             s: trial.s,
             by_shear: [0.0; 3],
             by_p: [0.0; 3],
@@ -97,30 +94,41 @@ impl<'a> System<'a> {
             of_shear: [0.0; 2],
             coupling: [[0.0; 2]; 2],
             start: [0.0; 2],
-            hardening,
+            hardening: Hardening::default(),
+        }
+    }
+
+    /// Makes the surfaces of a zone active.
+    #[inline]
+    pub(crate) fn enter(&mut self, zone: Zone) {
+        self.zone = zone;
+        self.s = self.condensed(&self.trial.s, self.soil.R_t);
+        self.by_shear = if zone.shear == Shear::None {
+            [0.0; 3]
+        } else {
+            self.elastic(&self.flow(self.sin_psi()))
         };
-        system.s = system.condensed(&trial.s, soil.R_t);
-        if zone.shear != Shear::None {
-            system.by_shear = system.elastic(&system.flow(system.sin_psi()));
-        }
         if zone.cap {
-            system.add_cap();
+            self.add_cap();
         }
-        system
     }
 
     #[inline]
     fn add_cap(&mut self) {
         let Soil { cap, .. } = self.soil;
         let theta = self.trial.theta;
+        self.hardening = cap.hardening(self.soil, self.trial.p_p);
+        self.a = cap.gradient(self.zone.merged);
         let start = [mean(&self.trial.start), cap.q(&self.trial.start)];
         self.start = start.map(|x| x * (1.0 - theta) / theta);
         self.of_s = [mean(&self.s), dot(&self.a, &self.s)];
         self.of_shear = [mean(&self.by_shear), dot(&self.a, &self.by_shear)];
         let factor = 2.0 / (cap.M * cap.M);
-        if !self.zone.cylinder {
-            self.by_p = self.elastic(&[2.0 / 3.0; 3]);
-        }
+        self.by_p = if self.zone.cylinder {
+            [0.0; 3]
+        } else {
+            self.elastic(&[2.0 / 3.0; 3])
+        };
         self.by_q = self.elastic(&self.a.map(|a| factor * a));
         self.coupling = [
             [mean(&self.by_p), mean(&self.by_q)],
@@ -243,30 +251,16 @@ impl<'a> System<'a> {
 
     /// Stress, conditions and their derivatives.
     #[inline]
-    pub(crate) fn at(&self, multipliers: [f64; 2]) -> Iterate {
-        let mut end = Iterate {
-            s: plus(&self.s, -multipliers[0], &self.by_shear),
-            multipliers,
-            residual: [0.0; 2],
-            middle: [0.0; 2],
-            by_multiplier: [self.by_shear.map(|x| -x), [0.0; 3]],
-            jacobian: [[1.0, 0.0], [0.0, 1.0]],
-            by_minor: 0.0,
-            by_gamma: 0.0,
-            by_pressure: 0.0,
-            by_shear: 0.0,
-            response: [[0.0; 2]; 2],
-            p_p: self.trial.p_p,
-            by_strain: 0.0,
-            by_start: 1.0,
-        };
+    pub(crate) fn evaluate(&self, multipliers: [f64; 2], end: &mut Iterate) {
+        end.multipliers = multipliers;
+        end.s = plus(&self.s, -multipliers[0], &self.by_shear);
+        end.by_multiplier = [self.by_shear.map(|x| -x), [0.0; 3]];
         if self.zone.cap {
-            self.flow_along_cap(&mut end);
+            self.flow_along_cap(end);
         }
         if self.zone.shear != Shear::None {
-            self.limit_shear(&mut end);
+            self.limit_shear(end);
         }
-        end
     }
 
     /// Stress after the cap's flow, and the second condition.
@@ -375,7 +369,7 @@ impl<'a> System<'a> {
         let [Lambda, mu] = end.multipliers;
         let t = &self.trial.s;
         let u = self.sin_psi();
-        let side = cap.gradient(false, false);
+        let side = cap.gradient(Merged::None);
         let along_q = mu * 2.0 * end.middle[1] / (cap.M * cap.M);
         let (gap, closing) = match self.zone.merged {
             Merged::None => return true,
@@ -478,6 +472,27 @@ impl<'a> System<'a> {
 }
 
 impl Iterate {
+    /// Without active surfaces.
+    #[inline]
+    pub(crate) fn new(s: [f64; 3], p_p: f64) -> Self {
+        Self {
+            s,
+            multipliers: [0.0; 2],
+            residual: [0.0; 2],
+            middle: [0.0; 2],
+            by_multiplier: [[0.0; 3]; 2],
+            jacobian: [[1.0, 0.0], [0.0, 1.0]],
+            by_minor: 0.0,
+            by_gamma: 0.0,
+            by_pressure: 0.0,
+            by_shear: 0.0,
+            response: [[0.0; 2]; 2],
+            p_p,
+            by_strain: 0.0,
+            by_start: 1.0,
+        }
+    }
+
     /// −J⁻¹ x.
     #[inline]
     pub(crate) fn correction<T: Linear>(&self, x: &[T; 2]) -> [T; 2] {
