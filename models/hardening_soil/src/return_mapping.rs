@@ -510,6 +510,8 @@ fn solve(
     const MAX_ITERATIONS: u32 = 30;
     /// Stress over that of the trial, beyond which the method diverges.
     const FARTHEST: f64 = 1e3;
+    /// Residual, over the stress, that one more correction leaves nothing of.
+    const NEGLIGIBLE: f64 = 1e-12;
     let tolerance = system.trial.tolerance;
     let mut before = 0.0;
     *end = Iterate::new(system.trial.s, system.trial.p_p);
@@ -522,12 +524,13 @@ fn solve(
         if reach.is_nan() || reach >= FARTHEST {
             return None;
         }
-        if residual <= 1e-15 || (residual <= 1e-12 && residual >= 0.5 * before && before > 0.0) {
+        if residual <= 1e-15 {
             return Some(());
         }
         let step = end.correction(&end.residual);
-        if residual <= tolerance
-            && residual * residual * residual <= 1e-7 * tolerance * before * before
+        let left_out = residual * residual * residual;
+        if residual <= NEGLIGIBLE
+            || (residual <= tolerance && left_out <= 1e-7 * tolerance * before * before)
         {
             system.correct(end, step);
             return Some(());

@@ -129,6 +129,7 @@ struct Passes<'a, const N: usize> {
     /// Size that the error is relative to, kPa.
     size: f64,
     error: f64,
+    excess: f64,
 }
 
 /// Where a step ends.
@@ -242,6 +243,7 @@ impl Soil {
                 strain,
                 size,
                 error,
+                excess: step.excess,
             };
             (step.at.1, step.error) = self.differentiate(&passes, derivative, part);
         }
@@ -263,21 +265,9 @@ impl Soil {
             ..
         } = part.increment;
         let unit = self.unit_stress(&step.strain);
-        let s_0 = step.start.values;
         let [(E_0, E_0_slope), (E, E_slope)] = step.stiffness;
         let [[_, x_0_by_gamma, x_0_by_minor], [_, x_1_by_q, x_1_by_minor]] = step.mobilised;
         let [at_0, over] = step.dilatancy;
-        let s_1 = end_1.solution.s;
-        let worst = (0..3).fold(0, |worst, i| {
-            let off = |i: usize| (end_2.solution.s[i] - s_1[i]).abs();
-            if off(i) > off(worst) { i } else { worst }
-        });
-        let sign = (end_2.solution.s[worst] - s_1[worst]).signum();
-        let by_size = if self.size(&s_0) > SMALL_STRESS * self.p_ref {
-            step.error
-        } else {
-            0.0
-        };
         let (turn_1, turn_2) = (axes_1.turn(), axes_2.turn());
         // Nothing follows a whole increment.
         let is_last = part.fraction >= 1.0;
@@ -323,8 +313,12 @@ impl Soil {
         let d_x_1 = (d_s_1[0] - d_s_1[2]) * x_1_by_q + d_s_1[2] * x_1_by_minor;
         of.sin_psi = d_x_0 * over[1] + d_x_1 * over[2];
         let end = end_2.rates(&of, !is_last);
-        let d_size = self.size_rate(&s_0, &d_s_0) * by_size;
-        let error = ((end.stress[worst] - d_s_1[worst]) * sign - d_size) * (1.0 / step.size);
+        // Only halves ask for it.
+        let error = if step.excess > 0.0 {
+            self.error_rate(step, &d_s_0, &d_s_1, &end.stress)
+        } else {
+            Rate::ZERO
+        };
         moved[..3].copy_from_slice(&end.stress);
         for (i, rate) in moved.iter_mut().enumerate().skip(3) {
             *rate = *rate * end_2.kappa(self, &axes_2.values, axes_2.pair(i));
@@ -335,6 +329,32 @@ impl Soil {
             gamma: end.gamma,
         };
         (derivative, error)
+    }
+
+    /// Rate of the error, from those of the stresses at the start and after the passes.
+    #[cold]
+    fn error_rate<const N: usize>(
+        &self,
+        step: &Passes<'_, N>,
+        d_s_0: &[Rate<N>; 3],
+        d_s_1: &[Rate<N>; 3],
+        d_s_2: &[Rate<N>; 3],
+    ) -> Rate<N> {
+        let s_0 = step.start.values;
+        let [s_1, s_2] = step.ends.map(|end| end.solution.s);
+        let off: [f64; 3] = array::from_fn(|i| s_2[i] - s_1[i]);
+        let worst = (1..3).fold(0, |worst, i| {
+            if off[i].abs() > off[worst].abs() {
+                i
+            } else {
+                worst
+            }
+        });
+        let mut rate = (d_s_2[worst] - d_s_1[worst]) * off[worst].signum();
+        if self.size(&s_0) > SMALL_STRESS * self.p_ref {
+            rate = rate - self.size_rate(&s_0, d_s_0) * step.error;
+        }
+        rate * (1.0 / step.size)
     }
 
     /// Carries a point over an increment.

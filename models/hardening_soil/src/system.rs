@@ -245,7 +245,7 @@ impl<'a> System<'a> {
 
     /// What the cap's flow along p and q̃ takes away.
     #[inline]
-    fn taken<T: Linear>(&self, [p, q]: [T; 2]) -> [T; 3] {
+    fn taken(&self, [p, q]: [f64; 2]) -> [f64; 3] {
         array::from_fn(|i| p * self.by_p[i] + q * self.by_q[i])
     }
 
@@ -400,39 +400,44 @@ impl<'a> System<'a> {
         let [Lambda, mu] = end.multipliers;
         let theta = self.trial.theta;
         let old = 1.0 - theta;
-        let by_E = of.E * (1.0 / self.trial.E);
-        let mut direct = self.condensed(&of.s, Rate::ZERO);
-        direct = plus(&direct, by_E * -Lambda, &self.by_shear);
-        let mut u = Rate::ZERO;
+        // All stress that flow takes away grows with E.
+        let flow = self.taken(end.middle);
+        let by_E = array::from_fn(|i| -(Lambda * self.by_shear[i] + mu * flow[i]) / self.trial.E);
+        let mut fixed = plus(&self.condensed(&of.s, Rate::ZERO), of.E, &by_E);
+        let mut gamma = of.gamma;
+        let [growth, weight, by_u, by_apart] = self.growth(Lambda);
         if self.zone.shear == Shear::Hardening {
-            u = of.sin_psi;
             let (zero, one) = (self.flow(0.0), self.flow(1.0));
-            let turned = self.elastic(&array::from_fn(|i| one[i] - zero[i]));
-            direct = plus(&direct, u * -Lambda, &turned);
+            let turned = self.elastic(&array::from_fn(|i| -Lambda * (one[i] - zero[i])));
+            fixed = plus(&fixed, of.sin_psi, &turned);
+            gamma = gamma + of.slowing * (growth / self.trial.slowing);
+            if by_apart != 0.0 {
+                let difference = (self.trial.s[0] - self.trial.s[1]) / self.trial.E;
+                let apart = self.apart(of.s[0] - of.s[1] - of.E * difference);
+                gamma = gamma + of.sin_psi * by_u + apart * by_apart;
+            }
         }
         let before = of.start.map(|s| [mean(&s), self.soil.cap.q(&s)]);
         if self.zone.cap {
-            let [mut p, mut q] = end.middle.map(|x| by_E * (-mu * x));
-            if let Some([p_0, q_0]) = before {
-                (p, q) = (p - p_0 * (mu * old), q - q_0 * (mu * old));
+            let along = |s: &[Rate<N>; 3], [p, q]: [Rate<N>; 2]| -> [Rate<N>; 3] {
+                plus(&plus(s, p, &self.by_p), q, &self.by_q)
+            };
+            if let Some(before) = before {
+                fixed = along(&fixed, before.map(|x| x * (-mu * old)));
             }
-            direct = plus(&direct, p, &self.by_p);
-            direct = plus(&direct, q, &self.by_q);
+            let response = end.response.map(|row| row.map(|x| -mu * x));
+            fixed = along(
+                &fixed,
+                times(&response, [mean(&fixed), dot(&self.a, &fixed)]),
+            );
         }
-        let follow = times(&end.response, [mean(&direct), dot(&self.a, &direct)]);
-        let taken = self.taken(follow);
-        let fixed = array::from_fn(|i| direct[i] - taken[i] * mu);
-        let [growth, weight, by_u, by_apart] = self.growth(Lambda);
-        let difference = self.trial.s[0] - self.trial.s[1];
-        let apart = self.apart(of.s[0] - of.s[1] - by_E * difference);
-        let slowed = of.slowing * (growth / self.trial.slowing);
-        let gamma = of.gamma + u * by_u + apart * by_apart + slowed;
         let mut change = [Rate::ZERO; 2];
         if self.zone.shear != Shear::None {
             change[0] = fixed[0] + fixed[2] * end.by_minor + gamma * end.by_gamma;
         }
         if self.zone.cap {
-            change[1] = mean(&fixed) * end.by_pressure + dot(&self.a, &fixed) * end.by_shear;
+            let normal = self.a.map(|a| end.by_pressure / 3.0 + a * end.by_shear);
+            change[1] = dot(&normal, &fixed);
             if let Some([p_0, _]) = before {
                 let volume = p_0 * (end.by_strain * 2.0 * mu * old);
                 change[1] = change[1] - of.p_p * end.by_start - volume;
@@ -440,7 +445,10 @@ impl<'a> System<'a> {
         }
         let [d_Lambda, d_mu] = end.correction(&change);
         let [by_Lambda, by_mu] = &end.by_multiplier;
-        let s = plus(&plus(&fixed, d_Lambda, by_Lambda), d_mu, by_mu);
+        let mut s = plus(&fixed, d_Lambda, by_Lambda);
+        if self.zone.cap {
+            s = plus(&s, d_mu, by_mu);
+        }
         let mut rates = Point {
             stress: s,
             p_p: of.p_p,
