@@ -3,6 +3,7 @@
 //! Compression is positive here.
 
 use crate::rate::Linear;
+use crate::return_mapping::Merged;
 use crate::soil::{FLOOR, Soil};
 use abi::Refusal;
 
@@ -26,7 +27,7 @@ pub(crate) struct Hardened {
 }
 
 /// Hardening from one preconsolidation pressure.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Hardening {
     start: f64,
     rest: f64,
@@ -113,12 +114,12 @@ impl Cap {
 
     /// Gradient of q̃; on an edge the mean of its sides.
     #[inline]
-    pub(crate) fn gradient(&self, equal_12: bool, equal_23: bool) -> [f64; 3] {
+    pub(crate) fn gradient(&self, merged: Merged) -> [f64; 3] {
         let half = 0.5 * self.delta;
-        match (equal_12, equal_23) {
-            (true, _) => [half, half, -self.delta],
-            (_, true) => [1.0, -0.5, -0.5],
-            _ => [1.0, self.delta - 1.0, -self.delta],
+        match merged {
+            Merged::None => [1.0, self.delta - 1.0, -self.delta],
+            Merged::First12 => [half, half, -self.delta],
+            Merged::Last23 => [1.0, -0.5, -0.5],
         }
     }
 

@@ -81,6 +81,12 @@ impl Zone {
         other
     }
 
+    /// Whether a stress in it solves equations.
+    #[inline]
+    fn has_equations(self) -> bool {
+        !self.corner && !self.is_elastic()
+    }
+
     #[inline]
     fn is_elastic(self) -> bool {
         self.shear == Shear::None && !self.cap && !self.tension && !self.corner
@@ -114,12 +120,10 @@ pub(crate) struct Trial {
 /// Where a trial stress returns to.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct End<'a> {
-    pub(crate) zone: Zone,
-    pub(crate) s: [f64; 3],
-    pub(crate) p_p: f64,
+    /// The equations and their solution; of an elastic return or one to the corner only the zone, stress and p_p count.
+    pub(crate) system: System<'a>,
+    pub(crate) solution: Iterate,
     pub(crate) gamma: f64,
-    /// The equations and their solution; none if the return was elastic or to the corner.
-    pub(crate) solved: Option<(System<'a>, Iterate)>,
 }
 
 /// Relative margin of a surface that a stress is on.
@@ -206,50 +210,70 @@ impl Soil {
             && self.beyond_shear(s, trial.gamma) <= margin
     }
 
-    /// Returns a trial stress, Eq. (15). None if the iterations fail: then a smaller step may not.
-    /// `guess` are zone and multipliers of a return from nearby.
+    /// Returns the trial stress of `end`, Eq. (15), at last with the cap's flow of the end alone. None if the
+    /// iterations fail: then a smaller step may not.
+    /// `guess` is a return from nearby, whose zone and multipliers are where to begin.
     #[inline]
-    pub(crate) fn return_stress(&self, trial: Trial, guess: Option<&End<'_>>) -> Option<End<'_>> {
-        let size = self.size(&trial.s);
+    pub(crate) fn return_stress<'a>(
+        &'a self,
+        end: &mut End<'a>,
+        guess: Option<&End<'a>>,
+    ) -> Option<()> {
+        let theta = end.system.trial.theta;
+        [
+            (true, theta, guess),
+            (false, theta, guess),
+            (false, 1.0, None),
+        ]
+        .into_iter()
+        .find_map(|(guesses, theta, guess)| {
+            end.system.trial.guesses = guesses;
+            end.system.trial.theta = theta;
+            self.try_return(end, guess)
+        })
+    }
+
+    fn try_return<'a>(&'a self, end: &mut End<'a>, guess: Option<&End<'a>>) -> Option<()> {
+        let End {
+            system,
+            solution,
+            gamma,
+        } = end;
+        let s = system.trial.s;
+        let size = self.size(&s);
         let margin = MARGIN * size;
-        let guess = guess.and_then(|end| Some((end.zone, end.solved.as_ref()?)));
-        let mut zone = match &guess {
-            Some((zone, _)) if !self.is_within(&trial, margin) => *zone,
-            _ => self.violated(&trial, margin),
+        let guess = guess.filter(|end| end.system.zone.has_equations());
+        let mut zone = match guess {
+            Some(end) if !self.is_within(&system.trial, margin) => end.system.zone,
+            _ => self.violated(&system.trial, margin),
         };
         if zone.is_elastic() {
-            return Some(End {
-                zone,
-                s: trial.s,
-                p_p: trial.p_p,
-                gamma: trial.gamma,
-                solved: None,
-            });
+            *end = End::new(self, system.trial);
+            return Some(());
         }
         let equal = |x: f64, y: f64| x - y <= margin;
-        let base = if equal(trial.s[1], trial.s[2]) {
+        let base = if equal(s[1], s[2]) {
             Merged::Last23
-        } else if equal(trial.s[0], trial.s[1]) {
+        } else if equal(s[0], s[1]) {
             Merged::First12
         } else {
             Merged::None
         };
         let mut multipliers = [0.0; 2];
-        if let Some((_, (_, iterate))) = guess {
-            multipliers = iterate.multipliers;
+        if let Some(end) = guess {
+            multipliers = end.solution.multipliers;
         } else if zone.shear != Shear::None || zone.cap {
             zone.merged = base;
-            if trial.guesses && base == Merged::None {
+            if system.trial.guesses && base == Merged::None {
                 // What was on an edge mostly stays there.
-                zone.merged = self.edge(&trial.start);
+                zone.merged = self.edge(&system.trial.start);
             }
         }
         let mut is_guess = zone.merged != base;
-        let hardening = self.cap.hardening(self, trial.p_p);
         let (mut may_harden, mut failures) = (true, 0);
         for _ in 0..MAX_ZONES {
-            let system = System::new(self, trial, zone, hardening);
-            let Some(end) = solve(&system, multipliers, size, trial.tolerance) else {
+            system.enter(zone);
+            if solve(system, solution, multipliers, size).is_none() {
                 if multipliers[0] + multipliers[1] > 0.0 {
                     multipliers = [0.0; 2];
                     continue;
@@ -265,26 +289,26 @@ impl Soil {
                     _ => return None,
                 }
                 continue;
-            };
-            multipliers = end.multipliers.map(|x| x.max(0.0));
-            if mem::take(&mut is_guess) && !system.merges(&end) {
+            }
+            multipliers = solution.multipliers.map(|x| x.max(0.0));
+            if mem::take(&mut is_guess) && !system.merges(solution) {
                 zone.merged = base;
                 continue;
             }
-            match self.judge(&system, &end, margin, may_harden) {
-                Verdict::Ends(_) if zone.merged != base && !system.merges(&end) => {
+            match self.judge(system, solution, margin, may_harden) {
+                Verdict::Ends(_) if zone.merged != base && !system.merges(solution) => {
                     zone.merged = base;
                 }
-                Verdict::Ends(gamma) => {
-                    return Some(End {
-                        zone,
-                        s: end.s,
-                        p_p: end.p_p,
-                        gamma,
-                        solved: Some((system, end)),
-                    });
+                Verdict::Ends(reached) => {
+                    *gamma = reached;
+                    return Some(());
                 }
-                Verdict::Corner => return Some(self.corner(&trial)),
+                Verdict::Corner => {
+                    *end = End::new(self, system.trial);
+                    end.system.zone.corner = true;
+                    end.solution.s = [-self.R_t; 3];
+                    return Some(());
+                }
                 Verdict::None => return None,
                 Verdict::Merge(merged) => zone.merged = merged,
                 Verdict::Other(other) => {
@@ -310,21 +334,6 @@ impl Soil {
             (true, false) => Merged::First12,
             (false, true) => Merged::Last23,
             _ => Merged::None,
-        }
-    }
-
-    /// All stresses at the apex or the tensile strength.
-    #[inline]
-    fn corner(&self, trial: &Trial) -> End<'_> {
-        End {
-            zone: Zone {
-                corner: true,
-                ..Zone::ELASTIC
-            },
-            s: [-self.R_t; 3],
-            p_p: trial.p_p,
-            gamma: trial.gamma,
-            solved: None,
         }
     }
 
@@ -414,7 +423,17 @@ impl Soil {
     }
 }
 
-impl End<'_> {
+impl<'a> End<'a> {
+    /// An elastic one.
+    #[inline]
+    pub(crate) fn new(soil: &'a Soil, trial: Trial) -> Self {
+        Self {
+            system: System::new(soil, trial),
+            solution: Iterate::new(trial.s, trial.p_p),
+            gamma: trial.gamma,
+        }
+    }
+
     /// Rates of an end, from the rates of what it depends on; those of p_p and γ_ps if they are asked for.
     #[inline]
     pub(crate) fn rates<const N: usize>(
@@ -422,43 +441,44 @@ impl End<'_> {
         of: &Rates<N>,
         with_variables: bool,
     ) -> Point<3, Rate<N>> {
-        match &self.solved {
-            Some((system, iterate)) => system.rates(iterate, of, with_variables),
-            None => Point {
-                stress: if self.zone.corner {
-                    [Rate::ZERO; 3]
-                } else {
-                    of.s
-                },
-                p_p: of.p_p,
-                gamma: of.gamma,
+        if self.system.zone.has_equations() {
+            return self.system.rates(&self.solution, of, with_variables);
+        }
+        Point {
+            stress: if self.system.zone.corner {
+                [Rate::ZERO; 3]
+            } else {
+                of.s
             },
+            p_p: of.p_p,
+            gamma: of.gamma,
         }
     }
 
     /// What the return of a trial stress leaves of a shear stress between two principal axes, Eq. (20).
     #[inline]
     pub(crate) fn kappa(&self, soil: &Soil, trial: &[f64; 3], [i, j]: [usize; 2]) -> f64 {
-        if self.zone.corner {
+        let System {
+            zone,
+            trial: Trial { theta, E, .. },
+            ..
+        } = self.system;
+        if zone.corner {
             return 0.0;
         }
         let gap = trial[i] - trial[j];
         let margin = MARGIN * soil.size(trial);
         if gap > margin {
-            return (self.s[i] - self.s[j]) / gap;
+            return (self.solution.s[i] - self.solution.s[j]) / gap;
         }
         // Of equal stresses those merge that flow would separate.
-        match &self.solved {
-            Some((system, end)) if self.zone.shear != Shear::None || self.zone.cap => {
-                let Trial { theta, E, .. } = system.trial;
-                if trial[0] - trial[2] <= margin && self.zone.cap {
-                    let M = soil.cap.M;
-                    1.0 / (1.0 + 6.0 * end.multipliers[1] * theta * soil.G * E / (M * M))
-                } else {
-                    0.0
-                }
-            }
-            _ => 1.0,
+        if zone.shear == Shear::None && !zone.cap {
+            1.0
+        } else if trial[0] - trial[2] <= margin && zone.cap {
+            let (M, mu) = (soil.cap.M, self.solution.multipliers[1]);
+            1.0 / (1.0 + 6.0 * mu * theta * soil.G * E / (M * M))
+        } else {
+            0.0
         }
     }
 }
@@ -483,16 +503,20 @@ enum Verdict {
 #[inline]
 fn solve(
     system: &System<'_>,
+    end: &mut Iterate,
     mut multipliers: [f64; 2],
     size: f64,
-    tolerance: f64,
-) -> Option<Iterate> {
+) -> Option<()> {
     const MAX_ITERATIONS: u32 = 30;
     /// Stress over that of the trial, beyond which the method diverges.
     const FARTHEST: f64 = 1e3;
+    /// Residual, over the stress, that one more correction leaves nothing of.
+    const NEGLIGIBLE: f64 = 1e-12;
+    let tolerance = system.trial.tolerance;
     let mut before = 0.0;
+    *end = Iterate::new(system.trial.s, system.trial.p_p);
     for _ in 0..MAX_ITERATIONS {
-        let mut end = system.at(multipliers);
+        system.evaluate(multipliers, end);
         // A sum: the larger of two numbers would hide one that is none.
         let residual = (end.residual[0].abs() + end.residual[1].abs()) / size;
         let stress = end.s[0].abs() + end.s[1].abs() + end.s[2].abs();
@@ -500,15 +524,16 @@ fn solve(
         if reach.is_nan() || reach >= FARTHEST {
             return None;
         }
-        if residual <= 1e-15 || (residual <= 1e-12 && residual >= 0.5 * before && before > 0.0) {
-            return Some(end);
+        if residual <= 1e-15 {
+            return Some(());
         }
         let step = end.correction(&end.residual);
-        if residual <= tolerance
-            && residual * residual * residual <= 1e-7 * tolerance * before * before
+        let left_out = residual * residual * residual;
+        if residual <= NEGLIGIBLE
+            || (residual <= tolerance && left_out <= 1e-7 * tolerance * before * before)
         {
-            system.correct(&mut end, step);
-            return Some(end);
+            system.correct(end, step);
+            return Some(());
         }
         before = residual;
         multipliers = [multipliers[0] + step[0], multipliers[1] + step[1]];

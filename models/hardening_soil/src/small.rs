@@ -131,9 +131,10 @@ impl SmallStrain {
         (stress(to) - stress(from)) / (to - from)
     }
 
-    /// h of Eq. (27).
+    /// h of Eq. (27); with `MOST` hardly any plastic shear strain is left.
     fn slowing(&self, least: f64) -> f64 {
-        self.factor * least.powf(self.exponent)
+        const MOST: f64 = 1e6;
+        (self.factor * least.powf(self.exponent)).min(MOST)
     }
 
     /// The memory after a strain increment, Eqs. (24) to (26).

@@ -129,6 +129,7 @@ struct Passes<'a, const N: usize> {
     /// Size that the error is relative to, kPa.
     size: f64,
     error: f64,
+    excess: f64,
 }
 
 /// Where a step ends.
@@ -179,45 +180,34 @@ impl Soil {
         let unit = self.unit_stress(&strain);
         let start = Principal::of(&from.stress);
         let s_0 = start.values;
-        let begin = self.hyperbola(from.gamma, s_0[2]);
-        let [x_0, by_q, by_minor] = self.mobilised(begin.q, s_0[2]);
-        let mobilised = [x_0, by_q * begin.by_gamma, by_q * begin.by_minor + by_minor];
+        let on = self.hyperbola(from.gamma, s_0[2]);
+        let [x_0, by_q, by_minor] = self.mobilised(on.q, s_0[2]);
+        let mobilised = [x_0, by_q * on.by_gamma, by_q * on.by_minor + by_minor];
         let axes = |E: f64| {
             let trial: [f64; N] = array::from_fn(|i| from.stress[i] + E * unit[i]);
             Principal::of(&trial)
         };
-        let pass = |s: [f64; 3], E: f64, sin_psi: f64, theta: f64, guess: Option<&End<'_>>| {
-            let tolerance = if guess.is_some() { ACCURATE } else { PREDICTED };
-            let trial = |guesses, theta| Trial {
-                s,
-                start: s_0,
-                E,
-                sin_psi,
-                sin_psi_limit: self.sin_psi,
-                p_p: from.p_p,
-                gamma: from.gamma,
-                slowing: part.increment.slowing,
-                theta,
-                tolerance,
-                guesses,
-            };
-            let mut end = self.return_stress(trial(true, theta), guess);
-            if end.is_none() {
-                end = self.return_stress(trial(false, theta), guess);
-            }
-            if end.is_none() {
-                end = self.return_stress(trial(false, 1.0), None);
-            }
-            end
+        let begin = |s: [f64; 3], E: f64, sin_psi: f64, theta: f64, tolerance: f64| Trial {
+            s,
+            start: s_0,
+            E,
+            sin_psi,
+            sin_psi_limit: self.sin_psi,
+            p_p: from.p_p,
+            gamma: from.gamma,
+            slowing: part.increment.slowing,
+            theta,
+            tolerance,
+            guesses: true,
         };
         let stiffening = part.increment.stiffening;
         let at_start = self.stiffness(s_0[2]);
         let E = stiffening * at_start.0;
         let u_0 = self.dilatancy(x_0, x_0);
         let axes_1 = &axes(E);
-        let end_1 = &pass(axes_1.values, E, u_0[0], 1.0, None);
-        let end_1 = end_1.as_ref()?;
-        let s_1 = end_1.s;
+        let mut end_1 = End::new(self, begin(axes_1.values, E, u_0[0], 1.0, PREDICTED));
+        self.return_stress(&mut end_1, None)?;
+        let s_1 = end_1.solution.s;
         let in_middle = self.stiffness(0.5 * (s_0[2] + s_1[2]));
         let E = stiffening * in_middle.0;
         let moved = self.mobilised(s_1[0] - s_1[2], s_1[2]);
@@ -225,16 +215,16 @@ impl Soil {
         let is_on_cap = self.beyond_cap(&s_0, from.p_p) > -NEARLY * self.size(&s_0);
         let theta = if is_on_cap { 0.5 } else { 1.0 };
         let axes_2 = &axes(E);
-        let end_2 = &pass(axes_2.values, E, u[0], theta, Some(end_1));
-        let end_2 = end_2.as_ref()?;
+        let mut end_2 = End::new(self, begin(axes_2.values, E, u[0], theta, ACCURATE));
+        self.return_stress(&mut end_2, Some(&end_1))?;
         let off = (0..3)
-            .map(|i| (end_2.s[i] - s_1[i]).abs())
+            .map(|i| (end_2.solution.s[i] - s_1[i]).abs())
             .fold(0.0, f64::max);
         let size = self.size(&s_0).max(SMALL_STRESS * self.p_ref);
         let error = off / size;
         let end = Point {
-            stress: axes_2.compose(&end_2.s),
-            p_p: end_2.p_p,
+            stress: axes_2.compose(&end_2.solution.s),
+            p_p: end_2.solution.p_p,
             gamma: end_2.gamma,
         };
         let mut step = Step {
@@ -249,10 +239,11 @@ impl Soil {
                 mobilised: [mobilised, moved],
                 dilatancy: [u_0, u],
                 axes: [axes_1, axes_2],
-                ends: [end_1, end_2],
+                ends: [&end_1, &end_2],
                 strain,
                 size,
                 error,
+                excess: step.excess,
             };
             (step.at.1, step.error) = self.differentiate(&passes, derivative, part);
         }
@@ -274,21 +265,9 @@ impl Soil {
             ..
         } = part.increment;
         let unit = self.unit_stress(&step.strain);
-        let s_0 = step.start.values;
         let [(E_0, E_0_slope), (E, E_slope)] = step.stiffness;
         let [[_, x_0_by_gamma, x_0_by_minor], [_, x_1_by_q, x_1_by_minor]] = step.mobilised;
         let [at_0, over] = step.dilatancy;
-        let s_1 = end_1.s;
-        let worst = (0..3).fold(0, |worst, i| {
-            let off = |i: usize| (end_2.s[i] - s_1[i]).abs();
-            if off(i) > off(worst) { i } else { worst }
-        });
-        let sign = (end_2.s[worst] - s_1[worst]).signum();
-        let by_size = if self.size(&s_0) > SMALL_STRESS * self.p_ref {
-            step.error
-        } else {
-            0.0
-        };
         let (turn_1, turn_2) = (axes_1.turn(), axes_2.turn());
         // Nothing follows a whole increment.
         let is_last = part.fraction >= 1.0;
@@ -334,8 +313,12 @@ impl Soil {
         let d_x_1 = (d_s_1[0] - d_s_1[2]) * x_1_by_q + d_s_1[2] * x_1_by_minor;
         of.sin_psi = d_x_0 * over[1] + d_x_1 * over[2];
         let end = end_2.rates(&of, !is_last);
-        let d_size = self.size_rate(&s_0, &d_s_0) * by_size;
-        let error = ((end.stress[worst] - d_s_1[worst]) * sign - d_size) * (1.0 / step.size);
+        // Only halves ask for it.
+        let error = if step.excess > 0.0 {
+            self.error_rate(step, &d_s_0, &d_s_1, &end.stress)
+        } else {
+            Rate::ZERO
+        };
         moved[..3].copy_from_slice(&end.stress);
         for (i, rate) in moved.iter_mut().enumerate().skip(3) {
             *rate = *rate * end_2.kappa(self, &axes_2.values, axes_2.pair(i));
@@ -346,6 +329,32 @@ impl Soil {
             gamma: end.gamma,
         };
         (derivative, error)
+    }
+
+    /// Rate of the error, from those of the stresses at the start and after the passes.
+    #[cold]
+    fn error_rate<const N: usize>(
+        &self,
+        step: &Passes<'_, N>,
+        d_s_0: &[Rate<N>; 3],
+        d_s_1: &[Rate<N>; 3],
+        d_s_2: &[Rate<N>; 3],
+    ) -> Rate<N> {
+        let s_0 = step.start.values;
+        let [s_1, s_2] = step.ends.map(|end| end.solution.s);
+        let off: [f64; 3] = array::from_fn(|i| s_2[i] - s_1[i]);
+        let worst = (1..3).fold(0, |worst, i| {
+            if off[i].abs() > off[worst].abs() {
+                i
+            } else {
+                worst
+            }
+        });
+        let mut rate = (d_s_2[worst] - d_s_1[worst]) * off[worst].signum();
+        if self.size(&s_0) > SMALL_STRESS * self.p_ref {
+            rate = rate - self.size_rate(&s_0, d_s_0) * step.error;
+        }
+        rate * (1.0 / step.size)
     }
 
     /// Carries a point over an increment.

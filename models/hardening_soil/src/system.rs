@@ -78,17 +78,14 @@ pub(crate) struct System<'a> {
 }
 
 impl<'a> System<'a> {
+    /// No active surface yet.
     #[inline]
-    pub(crate) fn new(soil: &'a Soil, trial: Trial, zone: Zone, hardening: Hardening) -> Self {
-        let a = soil.cap.gradient(
-            zone.merged == Merged::First12,
-            zone.merged == Merged::Last23,
-        );
-        let mut system = Self {
+    pub(crate) fn new(soil: &'a Soil, trial: Trial) -> Self {
+        Self {
             soil,
             trial,
-            zone,
-            a,
+            zone: Zone::ELASTIC,
+            a: [0.0; 3],
             s: trial.s,
             by_shear: [0.0; 3],
             by_p: [0.0; 3],
@@ -97,30 +94,41 @@ impl<'a> System<'a> {
             of_shear: [0.0; 2],
             coupling: [[0.0; 2]; 2],
             start: [0.0; 2],
-            hardening,
+            hardening: Hardening::default(),
+        }
+    }
+
+    /// Makes the surfaces of a zone active.
+    #[inline]
+    pub(crate) fn enter(&mut self, zone: Zone) {
+        self.zone = zone;
+        self.s = self.condensed(&self.trial.s, self.soil.R_t);
+        self.by_shear = if zone.shear == Shear::None {
+            [0.0; 3]
+        } else {
+            self.elastic(&self.flow(self.sin_psi()))
         };
-        system.s = system.condensed(&trial.s, soil.R_t);
-        if zone.shear != Shear::None {
-            system.by_shear = system.elastic(&system.flow(system.sin_psi()));
-        }
         if zone.cap {
-            system.add_cap();
+            self.add_cap();
         }
-        system
     }
 
     #[inline]
     fn add_cap(&mut self) {
         let Soil { cap, .. } = self.soil;
         let theta = self.trial.theta;
+        self.hardening = cap.hardening(self.soil, self.trial.p_p);
+        self.a = cap.gradient(self.zone.merged);
         let start = [mean(&self.trial.start), cap.q(&self.trial.start)];
         self.start = start.map(|x| x * (1.0 - theta) / theta);
         self.of_s = [mean(&self.s), dot(&self.a, &self.s)];
         self.of_shear = [mean(&self.by_shear), dot(&self.a, &self.by_shear)];
         let factor = 2.0 / (cap.M * cap.M);
-        if !self.zone.cylinder {
-            self.by_p = self.elastic(&[2.0 / 3.0; 3]);
-        }
+        self.by_p = if self.zone.cylinder {
+            [0.0; 3]
+        } else {
+            self.elastic(&[2.0 / 3.0; 3])
+        };
         self.by_q = self.elastic(&self.a.map(|a| factor * a));
         self.coupling = [
             [mean(&self.by_p), mean(&self.by_q)],
@@ -237,36 +245,22 @@ impl<'a> System<'a> {
 
     /// What the cap's flow along p and q̃ takes away.
     #[inline]
-    fn taken<T: Linear>(&self, [p, q]: [T; 2]) -> [T; 3] {
+    fn taken(&self, [p, q]: [f64; 2]) -> [f64; 3] {
         array::from_fn(|i| p * self.by_p[i] + q * self.by_q[i])
     }
 
     /// Stress, conditions and their derivatives.
     #[inline]
-    pub(crate) fn at(&self, multipliers: [f64; 2]) -> Iterate {
-        let mut end = Iterate {
-            s: plus(&self.s, -multipliers[0], &self.by_shear),
-            multipliers,
-            residual: [0.0; 2],
-            middle: [0.0; 2],
-            by_multiplier: [self.by_shear.map(|x| -x), [0.0; 3]],
-            jacobian: [[1.0, 0.0], [0.0, 1.0]],
-            by_minor: 0.0,
-            by_gamma: 0.0,
-            by_pressure: 0.0,
-            by_shear: 0.0,
-            response: [[0.0; 2]; 2],
-            p_p: self.trial.p_p,
-            by_strain: 0.0,
-            by_start: 1.0,
-        };
+    pub(crate) fn evaluate(&self, multipliers: [f64; 2], end: &mut Iterate) {
+        end.multipliers = multipliers;
+        end.s = plus(&self.s, -multipliers[0], &self.by_shear);
+        end.by_multiplier = [self.by_shear.map(|x| -x), [0.0; 3]];
         if self.zone.cap {
-            self.flow_along_cap(&mut end);
+            self.flow_along_cap(end);
         }
         if self.zone.shear != Shear::None {
-            self.limit_shear(&mut end);
+            self.limit_shear(end);
         }
-        end
     }
 
     /// Stress after the cap's flow, and the second condition.
@@ -375,7 +369,7 @@ impl<'a> System<'a> {
         let [Lambda, mu] = end.multipliers;
         let t = &self.trial.s;
         let u = self.sin_psi();
-        let side = cap.gradient(false, false);
+        let side = cap.gradient(Merged::None);
         let along_q = mu * 2.0 * end.middle[1] / (cap.M * cap.M);
         let (gap, closing) = match self.zone.merged {
             Merged::None => return true,
@@ -406,39 +400,44 @@ impl<'a> System<'a> {
         let [Lambda, mu] = end.multipliers;
         let theta = self.trial.theta;
         let old = 1.0 - theta;
-        let by_E = of.E * (1.0 / self.trial.E);
-        let mut direct = self.condensed(&of.s, Rate::ZERO);
-        direct = plus(&direct, by_E * -Lambda, &self.by_shear);
-        let mut u = Rate::ZERO;
+        // All stress that flow takes away grows with E.
+        let flow = self.taken(end.middle);
+        let by_E = array::from_fn(|i| -(Lambda * self.by_shear[i] + mu * flow[i]) / self.trial.E);
+        let mut fixed = plus(&self.condensed(&of.s, Rate::ZERO), of.E, &by_E);
+        let mut gamma = of.gamma;
+        let [growth, weight, by_u, by_apart] = self.growth(Lambda);
         if self.zone.shear == Shear::Hardening {
-            u = of.sin_psi;
             let (zero, one) = (self.flow(0.0), self.flow(1.0));
-            let turned = self.elastic(&array::from_fn(|i| one[i] - zero[i]));
-            direct = plus(&direct, u * -Lambda, &turned);
+            let turned = self.elastic(&array::from_fn(|i| -Lambda * (one[i] - zero[i])));
+            fixed = plus(&fixed, of.sin_psi, &turned);
+            gamma = gamma + of.slowing * (growth / self.trial.slowing);
+            if by_apart != 0.0 {
+                let difference = (self.trial.s[0] - self.trial.s[1]) / self.trial.E;
+                let apart = self.apart(of.s[0] - of.s[1] - of.E * difference);
+                gamma = gamma + of.sin_psi * by_u + apart * by_apart;
+            }
         }
         let before = of.start.map(|s| [mean(&s), self.soil.cap.q(&s)]);
         if self.zone.cap {
-            let [mut p, mut q] = end.middle.map(|x| by_E * (-mu * x));
-            if let Some([p_0, q_0]) = before {
-                (p, q) = (p - p_0 * (mu * old), q - q_0 * (mu * old));
+            let along = |s: &[Rate<N>; 3], [p, q]: [Rate<N>; 2]| -> [Rate<N>; 3] {
+                plus(&plus(s, p, &self.by_p), q, &self.by_q)
+            };
+            if let Some(before) = before {
+                fixed = along(&fixed, before.map(|x| x * (-mu * old)));
             }
-            direct = plus(&direct, p, &self.by_p);
-            direct = plus(&direct, q, &self.by_q);
+            let response = end.response.map(|row| row.map(|x| -mu * x));
+            fixed = along(
+                &fixed,
+                times(&response, [mean(&fixed), dot(&self.a, &fixed)]),
+            );
         }
-        let follow = times(&end.response, [mean(&direct), dot(&self.a, &direct)]);
-        let taken = self.taken(follow);
-        let fixed = array::from_fn(|i| direct[i] - taken[i] * mu);
-        let [growth, weight, by_u, by_apart] = self.growth(Lambda);
-        let difference = self.trial.s[0] - self.trial.s[1];
-        let apart = self.apart(of.s[0] - of.s[1] - by_E * difference);
-        let slowed = of.slowing * (growth / self.trial.slowing);
-        let gamma = of.gamma + u * by_u + apart * by_apart + slowed;
         let mut change = [Rate::ZERO; 2];
         if self.zone.shear != Shear::None {
             change[0] = fixed[0] + fixed[2] * end.by_minor + gamma * end.by_gamma;
         }
         if self.zone.cap {
-            change[1] = mean(&fixed) * end.by_pressure + dot(&self.a, &fixed) * end.by_shear;
+            let normal = self.a.map(|a| end.by_pressure / 3.0 + a * end.by_shear);
+            change[1] = dot(&normal, &fixed);
             if let Some([p_0, _]) = before {
                 let volume = p_0 * (end.by_strain * 2.0 * mu * old);
                 change[1] = change[1] - of.p_p * end.by_start - volume;
@@ -446,7 +445,10 @@ impl<'a> System<'a> {
         }
         let [d_Lambda, d_mu] = end.correction(&change);
         let [by_Lambda, by_mu] = &end.by_multiplier;
-        let s = plus(&plus(&fixed, d_Lambda, by_Lambda), d_mu, by_mu);
+        let mut s = plus(&fixed, d_Lambda, by_Lambda);
+        if self.zone.cap {
+            s = plus(&s, d_mu, by_mu);
+        }
         let mut rates = Point {
             stress: s,
             p_p: of.p_p,
@@ -478,6 +480,27 @@ impl<'a> System<'a> {
 }
 
 impl Iterate {
+    /// Without active surfaces.
+    #[inline]
+    pub(crate) fn new(s: [f64; 3], p_p: f64) -> Self {
+        Self {
+            s,
+            multipliers: [0.0; 2],
+            residual: [0.0; 2],
+            middle: [0.0; 2],
+            by_multiplier: [[0.0; 3]; 2],
+            jacobian: [[1.0, 0.0], [0.0, 1.0]],
+            by_minor: 0.0,
+            by_gamma: 0.0,
+            by_pressure: 0.0,
+            by_shear: 0.0,
+            response: [[0.0; 2]; 2],
+            p_p,
+            by_strain: 0.0,
+            by_start: 1.0,
+        }
+    }
+
     /// −J⁻¹ x.
     #[inline]
     pub(crate) fn correction<T: Linear>(&self, x: &[T; 2]) -> [T; 2] {

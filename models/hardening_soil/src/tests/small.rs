@@ -107,6 +107,31 @@ fn the_secant_at_half_the_strength_stays_e_50() {
     }
 }
 
+/// Where h of Eq. (27) would exceed the range of numbers, soil hardly flows at first.
+#[test]
+fn a_soil_far_stiffer_in_unloading_begins_elastically() {
+    let parameters = SmallParameters {
+        soil: SoilParameters {
+            e_50_ref: 1.4e3,
+            e_oed_ref: f64::NAN,
+            e_ur_ref: 2.8e6,
+            k_0_nc: 0.76,
+            ..DENSE
+        },
+        g_0_ref: 7e6,
+        gamma_07: 6e-4,
+    };
+    let law = HardeningSoilSmall::new(parameters).unwrap();
+    let mut path = Path::new(&law, [100.0; 3]);
+    path.state.p_p = 1e6;
+    let increment = [1e-7, -5e-8, -5e-8, 0.0, 0.0, 0.0];
+    let end = path.try_update(&increment, Tangent::None).unwrap();
+    let q = end.stress[1] - end.stress[0];
+    // Elastic shear, less the γ_ps of (3) over h: 2q/E_i over 10⁶ is 1.1 % of the strain.
+    let plastic = 1.0 - q / (2.0 * 7e6 * 1.5e-7);
+    assert!((plastic - 0.011).abs() < 2e-3, "{plastic}");
+}
+
 #[test]
 fn tangents_are_differences() {
     let law = law(DENSE);
