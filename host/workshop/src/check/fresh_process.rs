@@ -154,18 +154,11 @@ fn results(
     let scratch = Scratch::new()?;
     let file = scratch.path().join("calls");
     std::fs::write(&file, serde_json::to_vec(calls).map_err(internal)?).map_err(internal)?;
+    let mut arguments = vec!["check".into(), subject.path.clone().into()];
+    arguments.extend(["--child".into(), file.clone().into(), "--calls".into()]);
     let outcome = child::run(&Work {
-        arguments: vec![
-            "check".into(),
-            subject.path.clone().into(),
-            "--child".into(),
-            file.clone().into(),
-            "--calls".into(),
-        ],
-        folder: None,
         variables: variables.to_vec(),
-        time: PATIENCE,
-        memory: None,
+        ..Work::new(arguments, PATIENCE)
     })
     .map_err(internal)?;
     let answer = file::read_text(&answered(&file)).ok();
