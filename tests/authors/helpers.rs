@@ -34,7 +34,7 @@ fn a_library_holds_several_laws() {
             .unwrap();
         assert_eq!(built.n_states(), 0);
         let in_space = law.build(Hypothesis::Interface3d, &[0.0, 2.0]).unwrap();
-        let (_, stiffness) = in_space.at_rest(&[0.0; 3], Operator::Elastic).unwrap();
+        let (_, stiffness) = in_space.at_rest(&[0.0; 3], &[], Operator::Elastic).unwrap();
         assert_eq!(stiffness, [2e3, 0.0, 0.0, 0.0, 2e3, 0.0, 0.0, 0.0, 2e3]);
         let refused = law.build(Hypothesis::Interface2d, &[0.5, 1.0]).unwrap_err();
         assert!(refused.reason.contains("kind"), "{refused:?}");

@@ -390,6 +390,9 @@ impl PointCall {
     }
 }
 
+/// Fluxes, internal variables and operators at the end of an increment, point by point.
+pub type Updated = (Vec<f64>, Vec<f64>, Vec<f64>);
+
 /// A batch that can be used.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BatchSuccess {

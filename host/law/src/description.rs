@@ -63,7 +63,7 @@ pub(crate) fn or(text: String, other: &str) -> String {
 }
 
 /// The hypothesis of this name.
-pub(crate) fn hypothesis_named(name: &str) -> Option<Hypothesis> {
+pub fn hypothesis_named(name: &str) -> Option<Hypothesis> {
     Hypothesis::ALL.into_iter().find(|h| h.name() == name)
 }
 

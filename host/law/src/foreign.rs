@@ -11,7 +11,6 @@
 //! bare addresses the `guarded` arguments. A further adapter is a variant of [`Adapter`], an arm of `open`, and a `Source`
 //! with its `Instance`.
 
-pub mod conventions;
 mod guarded;
 mod mfront;
 mod sidecar;

@@ -1,6 +1,6 @@
 //! A law with its parameters, as elements call it.
 
-use crate::call::{Outcomes, PointCall};
+use crate::call::{Outcomes, PointCall, Updated};
 use crate::instance::Instance;
 use crate::process::current_call::{self, Doing};
 use crate::process::process_state;
@@ -268,23 +268,12 @@ impl Law {
     }
 
     /// Response of the law at a point with this flux and no history, over an increment without
-    /// any gradient: its flux and its operator, row by row (empty if not requested).
+    /// any gradient: its flux and its operator, row by row (empty if not requested). Some internal
+    /// variables, by number, begin with other values than the law's own.
     ///
     /// # Errors
     /// The law cannot start from the flux, or cannot leave it unchanged.
     pub fn at_rest(
-        &self,
-        flux: &[f64],
-        operator: Operator,
-    ) -> Result<(Vec<f64>, Vec<f64>), BatchFailure> {
-        self.at_rest_from(flux, &[], operator)
-    }
-
-    /// The same where some internal variables, by number, begin with other values than the law's own.
-    ///
-    /// # Errors
-    /// As [`Self::at_rest`].
-    pub fn at_rest_from(
         &self,
         flux: &[f64],
         initial: &[(usize, f64)],
@@ -297,21 +286,32 @@ impl Law {
         for &(number, value) in initial {
             state[number] = value;
         }
-        let (mut flux_end, mut state_end) = (flux.to_vec(), state.clone());
-        let mut written = vec![0.0; operator.n_entries(n)];
         let start = Start {
             gradient: (&zero, rows),
             gradient_end: (&zero, rows),
             state: &state,
             ..Start::of_fluxes(1, (flux, rows))
         };
+        let (flux, _, written) = self.update(&start, operator)?;
+        Ok((flux, written))
+    }
+
+    /// As [`Self::integrate`], with results of its own, point by point.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn update(&self, start: &Start<'_>, operator: Operator) -> Result<Updated, BatchFailure> {
+        let (n, n_points) = (self.n_components(), start.n_points);
+        let mut flux = vec![0.0; n_points * n];
+        let mut state = vec![0.0; n_points * self.n_states()];
+        let mut written = vec![0.0; n_points * operator.n_entries(n)];
         let end = End {
-            flux: (&mut flux_end, rows),
-            state: &mut state_end,
+            flux: (&mut flux, Strided::rows(n)),
+            state: &mut state,
             operator: &mut written,
         };
-        self.integrate(&start, operator, end)?;
-        Ok((flux_end, written))
+        self.integrate(start, operator, end)?;
+        Ok((flux, state, written))
     }
 
     /// Carries points over an increment. A law without a consistent tangent gives the elastic

@@ -36,12 +36,12 @@ pub mod trial;
 pub use abi::Hypothesis;
 pub use call::{
     BatchFailure, BatchSuccess, End, Moment, Operator, PointCall, PointStart, Request, Site, Start,
-    Strided,
+    Strided, Updated,
 };
 pub use construct::{BuildCause, BuildFailure, BuiltLaw, UsedParameter, Value};
 pub use description::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, ParameterDescription,
-    Tangent, words,
+    Tangent, hypothesis_named, words,
 };
 pub use error::Error;
 pub use find::expected_hashes::{Pins, lock_path};

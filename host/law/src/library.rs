@@ -31,7 +31,7 @@ use crate::process::process_state;
 use abi::raw::{self, Host, Law, MagicBlock};
 use abi::version::{self, PLUGIN_SIZE_1_0};
 use describe::{describe, known};
-use instance::{NOTHING, NOWHERE, OwnedInstance};
+use instance::{NOTHING, OwnedInstance};
 use probe::call_log::{self, KeptPhase, Phase};
 use std::ffi::CStr;
 use std::hint::black_box;

@@ -2,7 +2,7 @@
 
 use crate::process::child;
 use crate::process::vetting::{self, MARK, PASSED, REFUSED};
-use crate::{End, Error, Law, LoadedLaw, Opener, Operator, ParameterDescription, Start, Strided};
+use crate::{Error, Law, LoadedLaw, Opener, Operator, ParameterDescription, Start, Strided};
 use abi::Hypothesis;
 use std::io::Write;
 use std::path::Path;
@@ -71,9 +71,6 @@ fn step(law: &Law, operator: Operator, size: f64, flux: &[f64], state: &[f64]) {
     let rows = Strided::rows(n);
     let zero = vec![0.0; n * N_POINTS];
     let moved = vec![size; n * N_POINTS];
-    let mut flux_end = flux.to_vec();
-    let mut state_end = state.to_vec();
-    let mut operators = vec![0.0; n * n * N_POINTS];
     let start = Start {
         gradient: (&zero, rows),
         gradient_end: (&moved, rows),
@@ -81,12 +78,7 @@ fn step(law: &Law, operator: Operator, size: f64, flux: &[f64], state: &[f64]) {
         time_increment: 1.0,
         ..Start::of_fluxes(N_POINTS, (flux, rows))
     };
-    let end = End {
-        flux: (&mut flux_end, rows),
-        state: &mut state_end,
-        operator: &mut operators,
-    };
-    let _ = law.integrate(&start, operator, end);
+    let _ = law.update(&start, operator);
 }
 
 /// A value that a parameter may have; NaN: left out.

@@ -194,7 +194,7 @@ fn impossible_layer(group: &ElementGroup, material: &Material) -> Option<[f64; 2
     if !applies || law.hypothesis() != Hypothesis::Interface2d {
         return None;
     }
-    let (_, operator) = law.at_rest(&[-100.0, 0.0], Operator::Elastic).ok()?;
+    let (_, operator) = law.at_rest(&[-100.0, 0.0], &[], Operator::Elastic).ok()?;
     (operator[0] <= 4.0 / 3.0 * operator[3]).then(|| [operator[0], operator[3]])
 }
 

@@ -1,11 +1,11 @@
 //! A driver: a law, its start, and its path.
 
-use crate::error::{Cause, Error, Failure, Misuse, Moved, Place, Warning};
+use crate::error::{Cause, Error, Failure, Misuse, Place};
 use crate::path::{self, Segment};
 use crate::search::Search;
 use crate::state::{N_MAX, Point, Vector};
 use abi::status::Outcome;
-use law::{Law, Stop, Strided};
+use law::{Law, Stop, Strided, words};
 
 /// Column of the time.
 pub const TIME: &str = "time";
@@ -145,12 +145,12 @@ impl Driver {
     ///
     /// # Errors
     /// As [`Driver::run`] before its first increment.
-    pub fn check(&self) -> Result<Vec<Warning>, Error> {
+    pub fn check(&self) -> Result<Vec<String>, Error> {
         self.start().map(|(_, _, warnings)| warnings)
     }
 
     /// The initial state, checked by an update of no size.
-    pub(crate) fn start(&self) -> Result<(Point, Search<'_>, Vec<Warning>), Error> {
+    pub(crate) fn start(&self) -> Result<(Point, Search<'_>, Vec<String>), Error> {
         let point = Point {
             gradient: [0.0; N_MAX],
             flux: self.flux,
@@ -159,20 +159,20 @@ impl Driver {
         let mut search = Search::new(&self.law, &point);
         search.stop = self.stop.clone();
         search.moment.step_length = self.length_of_step(0);
-        let notes = self.notes.iter().cloned();
-        let mut warnings: Vec<Warning> = notes.map(Warning::Note).collect();
+        let mut warnings = self.notes.clone();
         let dependence = self.law.time_dependence();
         let depends_on_time = dependence.is_some();
         let says_none = |segment: &Segment| segment.time.is_none();
         let first = self.segments.iter().position(says_none);
         if let (Some(number), Some(by)) = (first, dependence) {
-            warnings.push(Warning::NoTime {
-                law: self.law.description().id.clone(),
-                by,
-                segment: number + 1,
-            });
+            warnings.push(format!(
+                "law `{}`{by} depends on the time, and segment {} says none: each of its increments \
+                 takes 1",
+                self.law.description().id,
+                number + 1
+            ));
         }
-        let failure = |cause| self.failure(Place::Start, cause, Vec::new());
+        let failure = |cause| Error::from(self.failure(Place::Start, cause));
         let answer = search
             .at_rest(&point)
             .map_err(|fatal| failure(Cause::Law(*fatal)))?;
@@ -191,7 +191,7 @@ impl Driver {
     }
 
     /// What to say of an initial flux that an update of no size moves.
-    fn moved(&self, returned: &Vector) -> Option<Warning> {
+    fn moved(&self, returned: &Vector) -> Option<String> {
         let n = self.law.n_components();
         let (given, returned) = (&self.flux[..n], &returned[..n]);
         let scale = self.flux.iter().fold(0.0_f64, |max, v| max.max(v.abs()));
@@ -199,17 +199,25 @@ impl Driver {
         if !pairs.any(|(returned, given)| (returned - given).abs() > OUTSIDE * scale) {
             return None;
         }
-        let moved = Moved {
-            law: self.law.description().id.clone(),
-            hypothesis: self.law.hypothesis(),
-            given: given.to_vec(),
-            returned: returned.to_vec(),
+        let (id, hypothesis) = (&self.law.description().id, self.law.hypothesis());
+        let (_, word) = words(hypothesis);
+        let list = |flux: &[f64]| {
+            let values = hypothesis.components().iter().zip(flux);
+            let values = values.map(|(name, value)| format!("{name} = {value:.6}"));
+            values.collect::<Vec<_>>().join(", ")
         };
+        let (given, returned) = (list(given), list(returned));
         // Those of other programs are given a time in this call, in which they may creep.
         Some(if self.law.library().foreign().is_some() {
-            Warning::DoesNotLast(moved)
+            format!(
+                "the initial {word} {given} does not last: law `{id}`, called without any change, \
+                 returns {returned}"
+            )
         } else {
-            Warning::OutsideSurface(moved)
+            format!(
+                "the initial {word} {given} lies outside the surface of law `{id}`, which returns it \
+                 to {returned}"
+            )
         })
     }
 
@@ -222,7 +230,7 @@ impl Driver {
                 Outcome::Domain | Outcome::Numeric | Outcome::CutStep => {
                     self.refused(failure.message)
                 }
-                _ => self.failure(Place::Start, Cause::InitialState(failure), Vec::new()),
+                _ => Error::from(self.failure(Place::Start, Cause::InitialState(failure))),
             })
     }
 
@@ -233,17 +241,18 @@ impl Driver {
         }
     }
 
-    pub(crate) fn failure(&self, place: Place, cause: Cause, warnings: Vec<Warning>) -> Error {
-        Error::Failure(Box::new(Failure {
+    pub(crate) fn failure(&self, place: Place, cause: Cause) -> Failure {
+        Failure {
             variant: self.variant.clone(),
             place,
             law: self.law.description().id.clone(),
             library: self.law.library().path().to_owned(),
             hypothesis: self.law.hypothesis(),
             cause,
-            warnings,
+            warnings: Vec::new(),
+            is_without_stiffness: false,
             advice: None,
-        }))
+        }
     }
 }
 

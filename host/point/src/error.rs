@@ -2,7 +2,7 @@
 //! `words`.
 
 use abi::Hypothesis;
-use law::{BatchFailure, TimeDependence};
+use law::BatchFailure;
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -91,8 +91,10 @@ pub struct Failure {
     pub hypothesis: Hypothesis,
     /// Why.
     pub cause: Cause,
-    /// What had been noticed on the way.
-    pub warnings: Vec<Warning>,
+    /// What had been noticed on the way, in sentences.
+    pub warnings: Vec<String>,
+    /// The elastic operator of the initial state is zero.
+    pub is_without_stiffness: bool,
     /// What else the user could do, said by those who know more.
     pub advice: Option<String>,
 }
@@ -158,99 +160,18 @@ pub enum Criterion {
     Restriction(usize),
 }
 
-/// What the user should know.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Warning {
-    /// Said by whoever built the law, or by the law.
-    Note(String),
-    /// The law returns the initial flux to another one.
-    OutsideSurface(Moved),
-    /// The law depends on the time, and a segment, counted from 1, says none.
-    NoTime {
-        /// Id of the law.
-        law: String,
-        /// Why it does.
-        by: TimeDependence,
-        /// The first such segment.
-        segment: usize,
-    },
-    /// The law, called without any change, returns another flux: it may creep in the time of the call.
-    DoesNotLast(Moved),
-    /// A component went farther than what it was led to explains.
-    Strayed {
-        /// Where first.
-        place: Place,
-        /// Id of the law.
-        law: String,
-        /// Its hypothesis.
-        hypothesis: Hypothesis,
-        /// The component.
-        component: &'static str,
-        /// The position reached.
-        gradient: f64,
-    },
-    /// A controlled flux stays away from its goal by what rounding the gradients makes of the law's
-    /// stiffness.
-    Blurred {
-        /// Where first.
-        place: Place,
-        /// Id of the law.
-        law: String,
-        /// Its hypothesis.
-        hypothesis: Hypothesis,
-        /// The component.
-        component: &'static str,
-        /// The flux found, kPa.
-        found: f64,
-        /// What it was to be.
-        goal: f64,
-    },
-    /// The gradient moved; flux and internal variables stayed to the last bit.
-    Ignored {
-        /// Where first.
-        first: Place,
-        /// In how many increments.
-        increments: usize,
-        /// Id of the law.
-        law: String,
-        /// Its hypothesis.
-        hypothesis: Hypothesis,
-    },
-    /// The elastic operator of the initial state is zero.
-    NoStiffness {
-        /// Id of the law.
-        law: String,
-    },
-    /// The law calls updates unreliable.
-    Unreliable {
-        /// Id of the law.
-        law: String,
-        /// How many.
-        times: usize,
-        /// Its words about the first.
-        first: String,
-    },
-}
-
-/// An initial flux that does not stay, kPa.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Moved {
-    /// Id of the law.
-    pub law: String,
-    /// Its hypothesis.
-    pub hypothesis: Hypothesis,
-    /// The flux given, by component.
-    pub given: Vec<f64>,
-    /// The flux returned.
-    pub returned: Vec<f64>,
-}
-
 impl From<Misuse> for Error {
     fn from(misuse: Misuse) -> Self {
         Self::Misuse {
             segment: None,
             misuse,
         }
+    }
+}
+
+impl From<Failure> for Error {
+    fn from(failure: Failure) -> Self {
+        Self::Failure(Box::new(failure))
     }
 }
 

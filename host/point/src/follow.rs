@@ -1,7 +1,7 @@
 //! Following the path: rows on the way, and what came of it.
 
 use crate::driver::Driver;
-use crate::error::{Cause, Error, NoEquilibrium, Place, Warning};
+use crate::error::{Cause, Error, Failure, NoEquilibrium, Place};
 use crate::frame::Frame;
 use crate::increments::{Halt, Walk};
 use crate::path::{Control, Segment};
@@ -39,7 +39,7 @@ pub struct Course {
     /// The last state, in the order of [`Driver::columns`].
     pub last: Vec<f64>,
     /// What the user should know.
-    pub warnings: Vec<Warning>,
+    pub warnings: Vec<String>,
 }
 
 /// The path as far as it was followed.
@@ -54,9 +54,9 @@ struct Way<'a> {
     moment: Moment,
     /// The flux that components without control keep.
     held: Vector,
-    warnings: Vec<Warning>,
-    strayed: Option<Warning>,
-    blurred: Option<Warning>,
+    warnings: Vec<String>,
+    strayed: Option<String>,
+    blurred: Option<String>,
 }
 
 impl Way<'_> {
@@ -147,12 +147,19 @@ impl Way<'_> {
         let (law, mut warnings) = (&self.driver.law, std::mem::take(&mut self.warnings));
         warnings.extend(self.strayed.take());
         warnings.extend(self.walk.ignored.warning(law));
-        if self.walk.search.is_without_stiffness() {
-            let law = law.description().id.clone();
-            warnings.push(Warning::NoStiffness { law });
+        let is_without_stiffness = self.walk.search.is_without_stiffness();
+        if is_without_stiffness {
+            warnings.push(format!(
+                "law `{}` has no stiffness in the initial state: its operator is zero there, as that of a \
+                 routine that leaves its tangent unset (DDSDDE of a UMAT), and no stress can be imposed by it",
+                law.description().id
+            ));
         }
-        let cause = self.driver.cause(halt);
-        self.driver.failure(place, cause, warnings)
+        Error::from(Failure {
+            warnings,
+            is_without_stiffness,
+            ..self.driver.failure(place, self.driver.cause(halt))
+        })
     }
 
     /// What came of it at the end.
@@ -164,12 +171,13 @@ impl Way<'_> {
         self.walk.change_frame(Frame::Cartesian, &mut self.held);
         // Results that the law calls inaccurate.
         let (times, first) = self.walk.search.unreliable;
-        warnings.extend((times > 0).then(|| Warning::Unreliable {
-            law: law.description().id.clone(),
-            times,
-            first,
-        }));
-        warnings.extend(law.take_notes().into_iter().map(Warning::Note));
+        if times > 0 {
+            let id = &law.description().id;
+            warnings.push(format!(
+                "law `{id}` calls {times} updates unreliable; the first: {first}"
+            ));
+        }
+        warnings.extend(law.take_notes());
         let n = law.n_components();
         let Point {
             gradient,
@@ -248,33 +256,35 @@ impl Driver {
     }
 
     /// What to say of a point that round-off keeps from its goal.
-    fn blurred(&self, walk: &Walk<'_>, goal: &Goal, place: Place) -> Option<Warning> {
+    fn blurred(&self, walk: &Walk<'_>, goal: &Goal, place: Place) -> Option<String> {
         if walk.search.is_restricted() {
             return None;
         }
         let miss = walk.search.blurred(&walk.point, goal)?;
         let hypothesis = self.law.hypothesis();
-        Some(Warning::Blurred {
-            place,
-            law: self.law.description().id.clone(),
-            hypothesis,
-            component: walk.search.frame().component(miss.component, hypothesis),
-            found: miss.flux,
-            goal: miss.goal,
-        })
+        let (gradient, flux) = words(hypothesis);
+        Some(format!(
+            "{place}: {flux} `{}` is {:.6e} where {:.6e} is asked for, and comes no nearer: law `{}` is so \
+             stiff that rounding the {gradient} changes the {flux} by as much",
+            walk.search.frame().component(miss.component, hypothesis),
+            miss.flux,
+            miss.goal,
+            self.law.description().id
+        ))
     }
 
     /// What to say of a point that went farther than what it was led to explains.
-    fn strayed(&self, walk: &Walk<'_>, place: Place) -> Option<Warning> {
+    fn strayed(&self, walk: &Walk<'_>, place: Place) -> Option<String> {
         let component = walk.search.strayed(&walk.point)?;
         let hypothesis = self.law.hypothesis();
-        Some(Warning::Strayed {
-            place,
-            law: self.law.description().id.clone(),
-            hypothesis,
-            component: walk.search.frame().component(component, hypothesis),
-            gradient: walk.point.gradient[component],
-        })
+        let (gradient, flux) = words(hypothesis);
+        Some(format!(
+            "{place}: {gradient} `{}` has to come to {:.3e} to meet its {flux}, which is all but the \
+             strength of law `{}`",
+            walk.search.frame().component(component, hypothesis),
+            walk.point.gradient[component],
+            self.law.description().id
+        ))
     }
 
     /// The meaning of a halt.

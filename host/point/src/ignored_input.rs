@@ -1,7 +1,7 @@
 //! Laws that take no notice of what they are led through: routines that refuse without saying so.
 
-use crate::error::{Place, Warning};
-use law::Law;
+use crate::error::Place;
+use law::{Law, words};
 
 /// Steps whose gradient moved, and what the law made of them.
 #[derive(Clone, Debug, Default)]
@@ -36,16 +36,18 @@ impl IgnoredInput {
 
     /// What the user should know. Without stress a contact that is open answers nothing either, as
     /// long as it has been, or will be, closed.
-    pub(crate) fn warning(&self, law: &Law) -> Option<Warning> {
+    pub(crate) fn warning(&self, law: &Law) -> Option<String> {
         let first = self.first?;
         if self.has_answered && !self.has_flux {
             return None;
         }
-        Some(Warning::Ignored {
-            first,
-            increments: self.increments,
-            law: law.description().id.clone(),
-            hypothesis: law.hypothesis(),
-        })
+        let (id, n) = (&law.description().id, self.increments);
+        let increments = if n == 1 { "increment" } else { "increments" };
+        let (gradient, flux) = words(law.hypothesis());
+        Some(format!(
+            "law `{id}` takes no notice of the {gradient} in {n} {increments}, first in {first}: {flux} and internal \
+             variables stay to the last bit; a routine that refuses without saying so does that, or a law \
+             without stiffness"
+        ))
     }
 }

@@ -52,9 +52,7 @@ mod state;
 mod tolerance_scale;
 
 pub use driver::{Driver, TIME};
-pub use error::{
-    Cause, Criterion, Error, Failure, Misuse, Moved, NoEquilibrium, Place, Unmet, Warning,
-};
+pub use error::{Cause, Criterion, Error, Failure, Misuse, NoEquilibrium, Place, Unmet};
 pub use follow::{Course, Row};
 pub use frame::Frame;
 pub use path::{Control, MAX_INCREMENTS, Segment};

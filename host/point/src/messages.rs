@@ -1,8 +1,6 @@
 //! What went wrong or was noticed, in sentences.
 
-use crate::error::{
-    Cause, Criterion, Error, Failure, Misuse, Moved, NoEquilibrium, Place, Unmet, Warning,
-};
+use crate::error::{Cause, Criterion, Error, Failure, Misuse, NoEquilibrium, Place, Unmet};
 use crate::path::{LONGEST, MAX_INCREMENTS};
 use abi::status::Outcome;
 use law::words;
@@ -166,7 +164,7 @@ impl Failure {
     pub fn hint(&self) -> Option<String> {
         let own = match &self.cause {
             // A stress without stiffness is not one beyond strength.
-            Cause::NoEquilibrium(_) if self.is_without_stiffness() => None,
+            Cause::NoEquilibrium(_) if self.is_without_stiffness => None,
             Cause::NoEquilibrium(why) => why.unmet.and_then(|unmet| self.instead_of(&unmet)),
             _ => None,
         };
@@ -174,11 +172,6 @@ impl Failure {
             (Some(own), Some(advice)) => Some(format!("{own}; {advice}")),
             (own, advice) => own.or_else(|| advice.clone()),
         }
-    }
-
-    fn is_without_stiffness(&self) -> bool {
-        let mut warnings = self.warnings.iter();
-        warnings.any(|warning| matches!(warning, Warning::NoStiffness { .. }))
     }
 
     fn instead_of(&self, unmet: &Unmet) -> Option<String> {
@@ -213,106 +206,6 @@ impl Unmet {
     }
 }
 
-impl Display for Warning {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Note(words) => f.write_str(words),
-            Self::OutsideSurface(moved) => {
-                let (word, given, returned) = moved.in_words();
-                write!(
-                    f,
-                    "the initial {word} {given} lies outside the surface of law `{}`, which returns \
-                     it to {returned}",
-                    moved.law
-                )
-            }
-            Self::NoTime { law, by, segment } => write!(
-                f,
-                "law `{law}`{by} depends on the time, and segment {segment} says none: each of its increments \
-                 takes 1"
-            ),
-            Self::DoesNotLast(moved) => {
-                let (word, given, returned) = moved.in_words();
-                write!(
-                    f,
-                    "the initial {word} {given} does not last: law `{}`, called without any change, \
-                     returns {returned}",
-                    moved.law
-                )
-            }
-            Self::Strayed {
-                place,
-                law,
-                hypothesis,
-                component,
-                gradient: reached,
-            } => {
-                let (gradient, flux) = words(*hypothesis);
-                write!(
-                    f,
-                    "{place}: {gradient} `{component}` has to come to {reached:.3e} to meet its \
-                     {flux}, which is all but the strength of law `{law}`"
-                )
-            }
-            Self::Blurred {
-                place,
-                law,
-                hypothesis,
-                component,
-                found,
-                goal,
-            } => {
-                let (gradient, flux) = words(*hypothesis);
-                write!(
-                    f,
-                    "{place}: {flux} `{component}` is {found:.6e} where {goal:.6e} is asked for, and comes no \
-                     nearer: law `{law}` is so stiff that rounding the {gradient} changes the {flux} by as much"
-                )
-            }
-            Self::Ignored {
-                first,
-                increments: n,
-                law,
-                hypothesis,
-            } => {
-                let (gradient, flux) = words(*hypothesis);
-                let increments = if *n == 1 { "increment" } else { "increments" };
-                write!(
-                    f,
-                    "law `{law}` takes no notice of the {gradient} in {n} {increments}, first in \
-                     {first}: {flux} and internal variables stay to the last bit; a routine that \
-                     refuses without saying so does that, or a law without stiffness"
-                )
-            }
-            Self::NoStiffness { law } => {
-                write!(
-                    f,
-                    "law `{law}` has no stiffness in the initial state: its operator is zero there, as that of a \
-                     routine that leaves its tangent unset (DDSDDE of a UMAT), and no stress can be imposed by it"
-                )
-            }
-            Self::Unreliable { law, times, first } => write!(
-                f,
-                "law `{law}` calls {times} updates unreliable; the first: {first}"
-            ),
-        }
-    }
-}
-
-impl Moved {
-    /// Name of the flux, and both fluxes by component.
-    fn in_words(&self) -> (&'static str, String, String) {
-        let components = self.hypothesis.components();
-        let list = |flux: &[f64]| {
-            let values = components.iter().zip(flux);
-            let values = values.map(|(name, value)| format!("{name} = {value:.6}"));
-            values.collect::<Vec<_>>().join(", ")
-        };
-        let (_, word) = words(self.hypothesis);
-        (word, list(&self.given), list(&self.returned))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -334,7 +227,8 @@ mod tests {
             library: "libjoint.so".into(),
             hypothesis: Hypothesis::Interface2d,
             cause,
-            warnings: vec![Warning::Note("a note".to_owned())],
+            warnings: vec!["a note".to_owned()],
+            is_without_stiffness: false,
             advice: None,
         }
     }

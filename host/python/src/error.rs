@@ -3,6 +3,7 @@
 use abi::status::Outcome;
 use input::{Error, Kind};
 use law::BatchFailure;
+use law::capsule::status;
 use mechanics::group::PointFailure;
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
@@ -16,19 +17,8 @@ pyo3::import_exception!(pilum._errors, NoSuchNameError);
 pyo3::import_exception!(pilum._errors, WrongTypeError);
 
 /// Name of an outcome.
-fn outcome_name(outcome: Outcome) -> &'static str {
-    match outcome {
-        Outcome::Ok => "ok",
-        Outcome::Unreliable => "unreliable",
-        Outcome::CutStep => "cut_step",
-        Outcome::Argument => "argument",
-        Outcome::Parameter => "parameter",
-        Outcome::Unsupported => "unsupported",
-        Outcome::Domain => "domain",
-        Outcome::Numeric => "numeric",
-        Outcome::Internal => "internal",
-        Outcome::Unknown(_) => "unknown",
-    }
+fn outcome_name(outcome: Outcome) -> String {
+    status(outcome).replace(' ', "_")
 }
 
 /// The exception for an error. `written` is the name of a text that no file has.
@@ -62,7 +52,7 @@ pub(crate) fn of_batch(py: Python<'_>, law: &law::Law, failure: &BatchFailure) -
     let fill = || -> PyResult<()> {
         attributes.set_item("law", id)?;
         attributes.set_item("point", failure.point)?;
-        attributes.set_item("outcome", name)?;
+        attributes.set_item("outcome", &name)?;
         attributes.set_item("cause", reason)?;
         attributes.set_item("factor", failure.factor)
     };

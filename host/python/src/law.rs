@@ -103,8 +103,7 @@ fn table_of(
 }
 
 fn hypothesis_named(name: &str) -> PyResult<Hypothesis> {
-    let mut all = Hypothesis::ALL.into_iter();
-    all.find(|one| one.name() == name).ok_or_else(|| {
+    law::hypothesis_named(name).ok_or_else(|| {
         let names = Hypothesis::ALL.map(Hypothesis::name);
         let hint = text::suggestion(name, names.to_vec());
         InputError::new_err(format!("there is no hypothesis `{name}`: {hint}"))

@@ -59,7 +59,7 @@ impl PointReport {
             calls: course.calls,
             cut_backs: course.cut_backs,
             last: driver.columns().into_iter().zip(course.last).collect(),
-            warnings: course.warnings.iter().map(ToString::to_string).collect(),
+            warnings: course.warnings,
             csv: None,
         }
     }

@@ -192,13 +192,7 @@ impl Source {
         if let Some(key) = key {
             return format!("`{key}`");
         }
-        let before = &text[..(span.start - start).min(text.len())];
-        let line = before.matches('\n').count() + 1;
-        let column = before
-            .rsplit('\n')
-            .next()
-            .map_or(0, |line| line.chars().count())
-            + 1;
+        let (line, column) = line_and_column(text, span.start - start);
         format!("{}:{line}:{column}", path.display())
     }
 
@@ -252,6 +246,14 @@ impl Source {
     }
 }
 
+/// Line and column of a byte, from 1.
+fn line_and_column(text: &str, at: usize) -> (usize, usize) {
+    let before = &text[..at.min(text.len())];
+    let first = before.rfind('\n').map_or(0, |end| end + 1);
+    let line = before.matches('\n').count() + 1;
+    (line, before[first..].chars().count() + 1)
+}
+
 /// The place where a file ceases to be UTF-8, and what it could be instead.
 fn not_utf_8(error: &FromUtf8Error) -> std::io::Error {
     let bytes = error.as_bytes();
@@ -302,17 +304,11 @@ pub struct Line<'e> {
 impl InputError {
     /// The line that it is about, for those who do not show it as [`crate::shown`] does.
     pub fn line(&self) -> Line<'_> {
-        let start = self.span.start.min(self.text.len());
-        let before = &self.text[..start];
-        let first = before.rfind('\n').map_or(0, |end| end + 1);
-        let text = self.text[first..].lines().next().unwrap_or_default();
+        let at = line_and_column(&self.text, self.span.start);
         Line {
             file: &self.path,
-            at: (
-                before.matches('\n').count() + 1,
-                before[first..].chars().count() + 1,
-            ),
-            text,
+            at,
+            text: self.text.lines().nth(at.0 - 1).unwrap_or_default(),
             label: self.label.as_deref(),
         }
     }

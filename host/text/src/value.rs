@@ -144,7 +144,7 @@ impl<'i> Deserializer<'i> for Value<'i> {
 
     forward_to_deserialize_any! {
         <V: Visitor<'i>>
-        char bytes byte_buf identifier
+        char bytes byte_buf identifier unit_struct tuple_struct
     }
 
     fn deserialize_unit<V: Visitor<'i>>(self, visitor: V) -> Result<V::Value, Misfit> {
@@ -153,14 +153,6 @@ impl<'i> Deserializer<'i> for Value<'i> {
             DeValue::Array(entries) if entries.is_empty() => visitor.visit_unit(),
             other => Err(Misfit::wrong(in_words(other), "an empty table").at(&self.span)),
         }
-    }
-
-    fn deserialize_unit_struct<V: Visitor<'i>>(
-        self,
-        _name: &'static str,
-        visitor: V,
-    ) -> Result<V::Value, Misfit> {
-        self.deserialize_unit(visitor)
     }
 
     fn deserialize_ignored_any<V: Visitor<'i>>(self, visitor: V) -> Result<V::Value, Misfit> {
@@ -200,15 +192,6 @@ impl<'i> Deserializer<'i> for Value<'i> {
         visitor: V,
     ) -> Result<V::Value, Misfit> {
         self.visit_as(&format!("a list of {length}"), visitor)
-    }
-
-    fn deserialize_tuple_struct<V: Visitor<'i>>(
-        self,
-        _name: &'static str,
-        length: usize,
-        visitor: V,
-    ) -> Result<V::Value, Misfit> {
-        self.deserialize_tuple(length, visitor)
     }
 
     fn deserialize_struct<V: Visitor<'i>>(

@@ -2,10 +2,10 @@
 
 use crate::Error;
 use abi::Hypothesis;
-use law::foreign::{self, Foreign, conventions};
+use law::foreign::{self, Foreign};
 use law::{
     Bounds, FormulationDescription, InternalVariable, LawDescription, LoadedLaw, Opener, Origin,
-    ParameterDescription, SearchPath, Tangent,
+    ParameterDescription, SearchPath, Tangent, hypothesis_named,
 };
 use serde::Serialize;
 use std::env::consts::DLL_SUFFIX;
@@ -13,6 +13,9 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use text::Source;
 
+/// What laws of each route into the program mean by their numbers. The adapters translate; who writes or reads such a
+/// routine needs them.
+const CONVENTIONS: &str = include_str!("laws/conventions.txt");
 /// Longest line of a page.
 const WIDTH: usize = 100;
 
@@ -77,7 +80,7 @@ pub fn list(search: &SearchPath) -> String {
         }
     }
     text.push('\n');
-    text.push_str(&conventions::text());
+    text.push_str(CONVENTIONS);
     text
 }
 
@@ -128,11 +131,8 @@ pub fn places(search: &SearchPath) -> String {
 /// # Errors
 /// [`text::Error::Internal`] only.
 pub fn places_json(search: &SearchPath) -> Result<String, Error> {
-    json(
-        &folders(search)
-            .map(|(_, folder)| folder)
-            .collect::<Vec<_>>(),
-    )
+    let folders = folders(search).map(|(_, folder)| folder);
+    json(&folders.collect::<Vec<_>>())
 }
 
 /// User subroutines of Abaqus in the folders of a search that have a sidecar. Nothing of them runs.
@@ -250,9 +250,7 @@ pub fn page(law: &LoadedLaw) -> String {
 }
 
 fn formulation_line(text: &mut String, formulation: &FormulationDescription) {
-    let hypothesis = Hypothesis::ALL
-        .into_iter()
-        .find(|h| h.name() == formulation.hypothesis);
+    let hypothesis = hypothesis_named(formulation.hypothesis);
     let components = hypothesis.map_or(String::new(), |h| h.components().join(" "));
     let pair = if hypothesis.is_some_and(Hypothesis::is_interface) {
         "jump (m) to traction (kPa)"

@@ -13,8 +13,8 @@ use abi::status::Outcome;
 use law::capsule::{Capsule, LibraryCapsule, OutcomePart, status};
 use law::child::{self, Ending, Work};
 use law::{
-    BatchFailure, End, Law, LoadedLaw, Opener, Operator, PointCall, Request, SearchPath, Start,
-    Strided, words,
+    BatchFailure, Law, LoadedLaw, Opener, Operator, PointCall, Request, SearchPath, Start, Strided,
+    Updated, words,
 };
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
@@ -31,9 +31,6 @@ const BISECTIONS: usize = 40;
 const PATIENCE: Duration = Duration::from_secs(30);
 /// Sizes of differences relative to the increment; the better agreement counts.
 const DIFFERENCES: [f64; 3] = [1e-3, 1e-5, 1e-7];
-
-/// Fluxes, internal variables, operator.
-type Answer = (Vec<f64>, Vec<f64>, Vec<f64>);
 
 /// How far a process has come that repeats a capsule, for the one that has started it.
 #[derive(Debug, Serialize, Deserialize)]
@@ -128,14 +125,7 @@ impl Called {
         let reached = scratch.path().join("reached");
         let mut arguments = vec!["replay".into(), capsule.into(), "--in-process".into()];
         arguments.extend(["--reached".into(), reached.clone().into()]);
-        let outcome = child::run(&Work {
-            arguments,
-            folder: None,
-            variables: Vec::new(),
-            time: limit,
-            memory: None,
-        })
-        .map_err(internal)?;
+        let outcome = child::run(&Work::new(arguments, limit)).map_err(internal)?;
         let reached = file::read_text(&reached).ok();
         let reached: Option<Reached> = reached.and_then(|text| serde_json::from_slice(&text).ok());
         let has_returned = match (&reached, outcome.ending) {
@@ -242,7 +232,7 @@ fn from<'a>(origin: impl IntoIterator<Item = (&'a String, &'a toml::Value)>) -> 
 /// Repeats the call and says what came out.
 fn compare(capsule: &Capsule, law: &Law, report: &mut Report<'_>) -> Result<(), Error> {
     let call = capsule.point_call(law)?;
-    if call.request == Request::InitialState {
+    let Request::Update(operator) = call.request else {
         let state = law.initial_state(1, call.as_start().flux);
         report.reached(&Reached::Returned)?;
         return match state {
@@ -253,8 +243,8 @@ fn compare(capsule: &Capsule, law: &Law, report: &mut Report<'_>) -> Result<(), 
             }
             Err(failure) => outcome(capsule, law, &failure, report),
         };
-    }
-    let updated = update(law, &call, call.request, 1.0);
+    };
+    let updated = update(law, &call, operator, 1.0);
     report.reached(&Reached::Returned)?;
     let failure = match updated {
         Ok((flux, state, _)) => {
@@ -269,7 +259,7 @@ fn compare(capsule: &Capsule, law: &Law, report: &mut Report<'_>) -> Result<(), 
         Err(failure) => failure,
     };
     let outcome = outcome(capsule, law, &failure, report);
-    let succeeds = |fraction| update(law, &call, call.request, fraction).is_ok();
+    let succeeds = |fraction| update(law, &call, operator, fraction).is_ok();
     if let Some(fraction) = bisect(succeeds, report) {
         report.say(&tangent(law, &call, fraction));
     }
@@ -335,9 +325,9 @@ pub(crate) fn parameters(capsule: &Capsule, law: &LoadedLaw) -> Result<Vec<f64>,
 fn update(
     law: &Law,
     call: &PointCall,
-    request: Request,
+    operator: Operator,
     fraction: f64,
-) -> Result<Answer, BatchFailure> {
+) -> Result<Updated, BatchFailure> {
     let gradient_end = if fraction < 1.0 {
         let ends = call.start.gradient0.iter().zip(&call.start.gradient1);
         ends.map(|(start, end)| start + fraction * (end - start))
@@ -346,37 +336,12 @@ fn update(
         call.start.gradient1.clone()
     };
     // The time as it was recorded, bit for bit, for the whole increment.
-    let time_increment = fraction * call.time_increment;
-    update_to(law, call, request, &gradient_end, time_increment)
-}
-
-fn update_to(
-    law: &Law,
-    call: &PointCall,
-    request: Request,
-    gradient_end: &[f64],
-    time_increment: f64,
-) -> Result<Answer, BatchFailure> {
-    let n = law.n_components();
-    let rows = Strided::rows(n);
-    let operator = match request {
-        Request::Update(operator) => operator,
-        Request::InitialState => Operator::None,
-    };
-    let (mut flux, mut state) = (vec![0.0; n], vec![0.0; law.n_states()]);
-    let mut matrix = vec![0.0; n * n];
     let start = Start {
-        gradient_end: (gradient_end, rows),
-        time_increment,
+        gradient_end: (&gradient_end, Strided::rows(gradient_end.len())),
+        time_increment: fraction * call.time_increment,
         ..call.as_start()
     };
-    let end = End {
-        flux: (&mut flux, rows),
-        state: &mut state,
-        operator: &mut matrix,
-    };
-    law.integrate(&start, operator, end)?;
-    Ok((flux, state, matrix))
+    law.update(&start, operator)
 }
 
 /// Says what came out and whether it is what was recorded; the error that it stands for.
@@ -490,9 +455,12 @@ impl<'a> Differences<'a> {
         let side = |sign: f64| {
             let mut moved = self.end.clone();
             moved[column] += sign * h;
-            let time_increment = self.fraction * self.call.time_increment;
-            let request = Request::Update(Operator::None);
-            update_to(self.law, self.call, request, &moved, time_increment)
+            let start = Start {
+                gradient_end: (&moved, Strided::rows(moved.len())),
+                time_increment: self.fraction * self.call.time_increment,
+                ..self.call.as_start()
+            };
+            self.law.update(&start, Operator::None)
         };
         let (plus, minus) = (side(1.0).ok()?.0, side(-1.0).ok()?.0);
         let off = (0..n).map(|i| {
@@ -505,9 +473,8 @@ impl<'a> Differences<'a> {
 
 /// Compares the tangent with central differences of the fluxes, in words.
 fn tangent(law: &Law, call: &PointCall, fraction: f64) -> String {
-    let consistent = Request::Update(Operator::Consistent);
     let n = law.n_components();
-    let matrix = match update(law, call, consistent, fraction) {
+    let matrix = match update(law, call, Operator::Consistent, fraction) {
         Ok((_, _, matrix)) => matrix,
         Err(failure) => return format!("no tangent to compare: {}", failure.message),
     };

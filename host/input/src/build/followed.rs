@@ -327,7 +327,7 @@ impl LawShelf<'_> {
         let table = self.valued_on(law, entry, asked)?;
         let built = self.built(law, (entry, &loaded, &table))?;
         let initial = self.initial(entry, &built.law, law)?;
-        let elastic = built.law.at_rest_from(stress, &initial, Operator::Elastic);
+        let elastic = built.law.at_rest(stress, &initial, Operator::Elastic);
         let (_, operator) = elastic.map_err(|failure| {
             let ([x, y], [s11, s22, s33, s12]) = (at, stress);
             let message = format!(

@@ -20,7 +20,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub struct Opener {
     trust: Trust,
     record: Option<PathBuf>,
-    /// Equal bytes are opened once, wherever they lie.
+    /// A file that stays what it is is opened once.
     opened: Arc<Mutex<Vec<Arc<Library>>>>,
 }
 
@@ -91,15 +91,7 @@ impl Opener {
         approve(&image.sha256)?;
         let sha256 = image.sha256.clone();
         let warnings = std::mem::take(&mut image.warnings);
-        // Workers open the library where it lies.
-        let is_shared = self.trust().isolate.is_none();
-        let mut same = opened.iter().filter(|_| is_shared);
-        let same = same.find(|library| library.sha256 == sha256);
-        let laws = if let Some(library) = same {
-            library.laws.clone()
-        } else {
-            self.laws_of(path, image)?
-        };
+        let laws = self.laws_of(path, image)?;
         let library = Arc::new(Library {
             path: path.to_owned(),
             sha256,

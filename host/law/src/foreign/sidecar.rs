@@ -11,7 +11,7 @@ use abi::Hypothesis;
 use serde::Deserialize;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
-use text::{Source, suggestion};
+use text::Source;
 use toml::Spanned;
 
 /// Most components of an internal variable; a slip of the pen beyond.
@@ -141,11 +141,7 @@ impl Sidecar {
         let parameters = file.parameter.iter().map(|p| parameter(source, p));
         let parameters = parameters.collect::<Result<Vec<_>, _>>()?;
         unique(source, file.parameter.iter().map(|p| &p.id), "parameter")?;
-        let mut variables = Vec::new();
-        for internal in &file.internal {
-            variables.extend(components(source, internal)?);
-        }
-        columns(source, &file.internal)?;
+        let variables = variables(source, &file.internal)?;
         let (formulations, ntens) = formulations(source, &file, &variables)?;
         let id = identifier(source, &file.id, "the law")?;
         let cmname = file.cmname.as_ref().map_or(&id, Spanned::get_ref);
@@ -195,7 +191,9 @@ fn formulations(
     let mut formulations = Vec::new();
     let mut ntens = Vec::new();
     for name in hypotheses {
-        let hypothesis = hypothesis(source, name)?;
+        let hypothesis = hypothesis_named(name.get_ref()).ok_or_else(|| {
+            source.unknown("hypothesis", name, Hypothesis::ALL.map(Hypothesis::name))
+        })?;
         ntens.push(called_with(source, file, name, hypothesis)?);
         formulations.push(FormulationDescription {
             hypothesis: hypothesis.name(),
@@ -284,37 +282,25 @@ pub(super) fn is_column(id: &str) -> bool {
 
 /// Internal variables are columns of tables: each has its own name, which none of the others
 /// that are there has.
-fn columns(source: &Source, internal: &[Internal]) -> Result<(), Error> {
+fn variables(source: &Source, internal: &[Internal]) -> Result<Vec<InternalVariable>, Error> {
     let mut seen = HashSet::new();
+    let mut variables = Vec::new();
     for written in internal {
         for variable in components(source, written)? {
-            let id = variable.id;
-            if is_column(&id) {
-                let message = format!(
-                    "internal variable `{id}` has the name of another column in tables of results"
-                );
-                return Err(source.error(written.id.span(), message).into());
-            }
-            if !seen.insert(id.clone()) {
-                let message = format!("internal variable `{id}` is declared twice");
-                return Err(source.error(written.id.span(), message).into());
-            }
+            let id = &variable.id;
+            let fault = if is_column(id) {
+                "has the name of another column in tables of results"
+            } else if !seen.insert(id.clone()) {
+                "is declared twice"
+            } else {
+                variables.push(variable);
+                continue;
+            };
+            let message = format!("internal variable `{id}` {fault}");
+            return Err(source.error(written.id.span(), message).into());
         }
     }
-    Ok(())
-}
-
-fn hypothesis(source: &Source, name: &Spanned<String>) -> Result<Hypothesis, Error> {
-    hypothesis_named(name.get_ref()).ok_or_else(|| {
-        let message = format!("there is no hypothesis `{}`", name.get_ref());
-        source
-            .error(name.span(), message)
-            .hint(suggestion(
-                name.get_ref(),
-                Hypothesis::ALL.map(Hypothesis::name),
-            ))
-            .into()
-    })
+    Ok(variables)
 }
 
 /// NTENS that the routine is called with under a hypothesis.
@@ -326,25 +312,25 @@ fn called_with(
 ) -> Result<usize, Error> {
     let can = |n: usize| file.ntens.iter().any(|ntens| *ntens.get_ref() == n);
     let n = hypothesis.n_components();
+    if can(n) {
+        return Ok(n);
+    }
     let is_plane = matches!(
         hypothesis,
         Hypothesis::PlaneStrain | Hypothesis::Axisymmetric
     );
-    if can(n) {
-        return Ok(n);
-    }
-    if can(6) && is_plane {
-        if file.expand {
-            return Ok(6);
-        }
-        let message = format!("{} has NTENS = {n}, which `ntens` lacks", hypothesis.name());
-        return Err(source
-            .error(name.span(), message)
-            .hint("`expand = true` calls the routine with 6 components, 13 and 23 at zero")
-            .into());
+    let can_expand = can(6) && is_plane;
+    if can_expand && file.expand {
+        return Ok(6);
     }
     let message = format!("{} has NTENS = {n}, which `ntens` lacks", hypothesis.name());
-    Err(source.error(name.span(), message).into())
+    let error = source.error(name.span(), message);
+    Err(if can_expand {
+        error.hint("`expand = true` calls the routine with 6 components, 13 and 23 at zero")
+    } else {
+        error
+    }
+    .into())
 }
 
 fn parameter(source: &Source, p: &Parameter) -> Result<ParameterDescription, Error> {

@@ -94,7 +94,7 @@ pub(super) const NOTHING: View = View {
     point: 0,
     component: 0,
 };
-pub(super) const NOWHERE: ViewMut = ViewMut {
+const NOWHERE: ViewMut = ViewMut {
     p: null_mut(),
     point: 0,
     component: 0,

@@ -39,6 +39,19 @@ pub struct Work {
     pub memory: Option<u64>,
 }
 
+impl Work {
+    /// A child with these arguments in this process's surroundings, which may take all memory.
+    pub fn new(arguments: Vec<OsString>, time: Duration) -> Self {
+        Self {
+            arguments,
+            folder: None,
+            variables: Vec::new(),
+            time,
+            memory: None,
+        }
+    }
+}
+
 /// How a child ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ending {
@@ -325,14 +338,10 @@ mod tests {
     /// Runs one of the tests below that is left out unless it is asked for by name.
     fn run_test(name: &str, seconds: u64, memory: Option<u64>) -> Outcome {
         let name = format!("process::child::tests::{name}");
+        let arguments = [&name, "--exact", "--ignored", "--nocapture"].map(OsString::from);
         run(&Work {
-            arguments: [&name, "--exact", "--ignored", "--nocapture"]
-                .map(OsString::from)
-                .to_vec(),
-            folder: None,
-            variables: Vec::new(),
-            time: Duration::from_secs(seconds),
             memory,
+            ..Work::new(arguments.to_vec(), Duration::from_secs(seconds))
         })
         .unwrap()
     }

@@ -6,7 +6,6 @@
 
 use super::child::{self, Ending, Work};
 use crate::Error;
-use std::ffi::OsString;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -47,15 +46,8 @@ pub(crate) fn vet(path: &Path, sha256: &str) -> Result<(), Error> {
         return Ok(());
     }
     let work = Work {
-        arguments: vec![
-            OsString::from(COMMAND),
-            path.as_os_str().to_owned(),
-            OsString::from(sha256),
-        ],
-        folder: None,
-        variables: Vec::new(),
-        time: TIME,
         memory: Some(MEMORY),
+        ..Work::new(vec![COMMAND.into(), path.into(), sha256.into()], TIME)
     };
     let outcome = child::run(&work).map_err(|why| untried(path, &why))?;
     let output = String::from_utf8_lossy(&outcome.stdout);

@@ -37,7 +37,7 @@ pub(crate) fn turned(law: &Law, formulation: Formulation, stress: [f64; 4]) -> O
 
 /// Why a law does not leave a stress as it is over a zero increment.
 fn refused(law: &Law, stress: &[f64]) -> Option<String> {
-    let flux = match law.at_rest(stress, Operator::None) {
+    let flux = match law.at_rest(stress, &[], Operator::None) {
         Ok((flux, _)) => flux,
         Err(failure) if failure.message.is_empty() => return Some("no reason given".to_owned()),
         Err(failure) => return Some(failure.message),

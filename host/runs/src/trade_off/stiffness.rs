@@ -330,7 +330,7 @@ fn elastic_operator(law: &Law) -> Option<Vec<f64>> {
     let flux: Vec<f64> = (0..n)
         .map(|i| if i < normal { NORMAL_STRESS } else { 0.0 })
         .collect();
-    let (_, operator) = law.at_rest(&flux, Operator::Elastic).ok()?;
+    let (_, operator) = law.at_rest(&flux, &[], Operator::Elastic).ok()?;
     Some(operator)
 }
 

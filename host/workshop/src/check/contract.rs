@@ -6,9 +6,7 @@ use super::points::{UPDATE, first_difference};
 use super::random::Random;
 use super::specimen::{Specimen, create_form, hypotheses};
 use super::verdict::Outcome::{Failed, Skipped};
-use super::{
-    Check, Family, Found, Subject, Verdict, author_path, failed, refusal, skipped, status_name,
-};
+use super::{Check, Found, Subject, Verdict, author_path, failed, refusal, skipped, status_name};
 use abi::raw;
 use abi::status::{Outcome, most_severe};
 use abi::version::BATCH_SIZE_1_0;
@@ -18,7 +16,6 @@ use law::{LoadedLaw, ParameterDescription};
 pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "create-works",
-        family: Family::Contract,
         description: "`create` accepts ordinary parameters for every hypothesis; `destroy` frees \
                       the instance and accepts null.",
         needs: &["description-is-readable"],
@@ -26,7 +23,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "wrong-arguments-are-refused",
-        family: Family::Contract,
         description: "`create` refuses a wrong number of values, values at null and an unknown \
                       formulation with PILUM_E_ARGUMENT, a message, and no instance.",
         needs: &["create-works"],
@@ -34,7 +30,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "bounds-are-kept",
-        family: Family::Contract,
         description: "`create` refuses values just outside each bound, NaN and infinities with \
                       PILUM_E_PARAMETER and a message that starts with the parameter's id.",
         needs: &["create-works"],
@@ -42,7 +37,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "initial-states-are-written",
-        family: Family::Contract,
         description: "If `init_state` succeeds, it has written an outcome and all internal \
                       variables, finite, of every point.",
         needs: &["create-works"],
@@ -50,7 +44,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "integrate-works",
-        family: Family::Contract,
         description: "`integrate` and `init_state` return in time, write an outcome for every \
                       point and report no defect; some increments succeed.",
         needs: &["initial-states-are-written"],
@@ -58,7 +51,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "unknown-requests-are-refused",
-        family: Family::Contract,
         description: "An unknown request, or one of rates to a law without them, is refused with \
                       PILUM_E_UNSUPPORTED, without outcomes.",
         needs: &["integrate-works"],
@@ -66,7 +58,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "missing-tangent-is-refused",
-        family: Family::Contract,
         description: "With PILUM_T_NO_TANGENT a request of the consistent tangent gives \
                       PILUM_E_UNSUPPORTED.",
         needs: &["integrate-works"],
@@ -74,21 +65,18 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "empty-batch-is-accepted",
-        family: Family::Contract,
         description: "A batch without points succeeds.",
         needs: &["integrate-works"],
         run: empty_batch_is_accepted,
     },
     Check {
         id: "null-outcomes-are-accepted",
-        family: Family::Contract,
         description: "Without `status`, `step_factor` and `message`, results have the same bits.",
         needs: &["repeatable"],
         run: null_outcomes_are_accepted,
     },
     Check {
         id: "messages-fit",
-        family: Family::Contract,
         description: "A failure writes a message that ends in NUL within its buffer of 512, 16, \
                       2, 1 or 0 bytes, and has the number of the point.",
         needs: &["integrate-works"],
@@ -96,7 +84,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "longer-structs-are-accepted",
-        family: Family::Contract,
         description: "A host of a later minor version, whose batch and description have 64 \
                       unknown bytes at their ends, gets the same bits.",
         needs: &["repeatable"],
@@ -104,7 +91,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "shorter-batch-is-refused",
-        family: Family::Contract,
         description: "A batch shorter than in version 1.0 is refused with PILUM_E_ARGUMENT; \
                       forbidden memory follows its last byte.",
         needs: &["integrate-works"],
@@ -114,7 +100,7 @@ pub(super) const CHECKS: &[Check] = &[
 
 fn create_works(subject: &Subject) -> Found {
     let mut random = Random::new(subject.seed, "create");
-    let specimens = subject.specimens(2, &mut random)?;
+    let specimens = subject.specimens(Draw::Any, 2, &mut random)?;
     for law in subject.laws()? {
         law.destroy_nothing();
     }
@@ -242,7 +228,7 @@ fn around_bounds(p: &ParameterDescription) -> [Vec<f64>; 2] {
 }
 
 fn bounds_are_kept(subject: &Subject) -> Found {
-    let n = subject.each("bounds", 1, |specimen, _| {
+    let n = subject.each(Draw::Any, "bounds", 1, |specimen, _| {
         let law = &specimen.law;
         let mut n = 0;
         for (i, p) in law.description().parameters.iter().enumerate() {
@@ -282,7 +268,7 @@ fn bounds_are_kept(subject: &Subject) -> Found {
 }
 
 fn initial_states_are_written(subject: &Subject) -> Found {
-    let n = subject.each("initial states", 2, |specimen, random| {
+    let n = subject.each(Draw::Any, "initial states", 2, |specimen, random| {
         let mut n_points = 0;
         // One point without any flux, and so many under pressure.
         for n in [0, 1, 2, 5, 16, 33] {
@@ -336,7 +322,7 @@ fn unwritten(specimen: &Specimen, answer: &Answer) -> Option<(usize, String)> {
 fn integrate_works(subject: &Subject) -> Found {
     author_path::is_followed(subject)?;
     let mut n_successes = 0;
-    let n = subject.each("integrate", 2, |specimen, random| {
+    let n = subject.each(Draw::Any, "integrate", 2, |specimen, random| {
         let walk = specimen.walk(12, random).map_err(|mut verdict| {
             // A law that starts nowhere does not work.
             if verdict.outcome == Skipped {
@@ -382,7 +368,7 @@ fn each_with_points(
     n_points: usize,
     mut look: impl FnMut(&Specimen, Vec<PointStart>) -> Result<(), Verdict>,
 ) -> Found {
-    subject.each(name, 1, |specimen, random| {
+    subject.each(Draw::Any, name, 1, |specimen, random| {
         look(specimen, specimen.points(n_points, random)?)?;
         Ok(0)
     })?;
@@ -410,7 +396,7 @@ fn unknown_requests_are_refused(subject: &Subject) -> Found {
 }
 
 fn missing_tangent_is_refused(subject: &Subject) -> Found {
-    let n = subject.each("no tangent", 1, |specimen, random| {
+    let n = subject.each(Draw::Any, "no tangent", 1, |specimen, random| {
         if specimen.formulation.tangent != law::Tangent::None {
             return Ok(0);
         }
@@ -435,7 +421,7 @@ fn missing_tangent_is_refused(subject: &Subject) -> Found {
 }
 
 fn empty_batch_is_accepted(subject: &Subject) -> Found {
-    subject.each("empty", 1, |specimen, _| {
+    subject.each(Draw::Any, "empty", 1, |specimen, _| {
         let answer = specimen.call(&[], UPDATE)?;
         let init = specimen.probe.init_state(&[], &Form::of(0))?;
         for (function, answer) in [("integrate", Some(answer)), ("init_state", init)] {
@@ -452,7 +438,7 @@ fn empty_batch_is_accepted(subject: &Subject) -> Found {
 }
 
 fn null_outcomes_are_accepted(subject: &Subject) -> Found {
-    subject.each("null", 2, |specimen, random| {
+    subject.each(Draw::Any, "null", 2, |specimen, random| {
         let points = specimen.points(16, random)?;
         let form = Form::of(UPDATE);
         let with = specimen.probe.integrate(&points, &form)?;

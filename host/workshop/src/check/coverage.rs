@@ -1,17 +1,17 @@
 //! How far do the paths of the checks lead a law? One that is only ever asked what is elastic passes them all.
 
+use super::draw::Draw;
 use super::loading_path::{Step, flux_scale, starts};
 use super::mathematics::NEEDS;
 use super::points::{ELASTIC, ROUND_OFF, bits, increment, largest};
 use super::specimen::Specimen;
-use super::{Check, Family, Found, Subject, Verdict, counted, skipped, warned};
+use super::{Check, Found, Subject, Verdict, counted, skipped, warned};
 use law::probe::PointEnd;
 use std::fmt::Write as _;
 
 pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "results-do-not-blow-up",
-        family: Family::Mathematics,
         description: "No flux or internal variable exceeds 10³⁰ on the paths, in whatever unit; \
                       the other checks end there (warning, since a path may be too long).",
         needs: NEEDS,
@@ -19,7 +19,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "paths-leave-elasticity",
-        family: Family::Mathematics,
         description: "With internal variables, some increments are inelastic or change one of \
                       them; no component of the flux with a stiffness stays constant (warning). \
                       Variables that never change are reported.",
@@ -29,7 +28,7 @@ pub(super) const CHECKS: &[Check] = &[
 ];
 
 fn results_do_not_blow_up(subject: &Subject) -> Found {
-    let n = subject.each_by_default("blow up", 4, |specimen, random| {
+    let n = subject.each(Draw::DefaultChoices, "blow up", 4, |specimen, random| {
         let walk = specimen.paths(N_FAR, random)?;
         match &walk.blown_up {
             Some(step) => Err(blows_up(specimen, step)),
@@ -68,7 +67,7 @@ fn paths_leave_elasticity(subject: &Subject) -> Found {
     let mut n_inelastic = 0;
     let mut still: Option<Vec<String>> = None;
     let mut idle = None;
-    let n = subject.each_by_default("extent", 1, |specimen, random| {
+    let n = subject.each(Draw::DefaultChoices, "extent", 1, |specimen, random| {
         let walk = specimen.paths(N_INCREMENTS, random)?;
         let steps = &walk.steps;
         if steps.is_empty() {

@@ -65,14 +65,7 @@ pub(super) fn repeated(
     limit: Duration,
     origin: [(String, toml::Value); 2],
 ) -> Option<String> {
-    let work = Work {
-        arguments: tell,
-        folder: None,
-        variables: Vec::new(),
-        time: READING,
-        memory: None,
-    };
-    child::run(&work).ok()?;
+    child::run(&Work::new(tell, READING)).ok()?;
     let scratch = &kept.with_extension("toml");
     let source = Source::read(scratch).ok()?;
     let internal = status(abi::status::Outcome::Internal).to_owned();

@@ -1,13 +1,12 @@
 //! Is what the library says about its laws readable, complete and true?
 
-use super::{Check, Family, Found, Subject, Verdict, skipped, warned};
+use super::{Check, Found, Subject, Verdict, skipped, warned};
 use law::foreign::Adapter;
 use std::collections::BTreeSet;
 
 pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "description-is-readable",
-        family: Family::Description,
         description: "The tables are readable and plausible: counts, sizes, UTF-8, well-formed \
                       unique ids, bounds in order, known gradients and fluxes.",
         needs: &["entry-is-idempotent"],
@@ -15,7 +14,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "description-is-complete",
-        family: Family::Description,
         description: "No text is empty, initial values are finite, every law offers a hypothesis \
                       (warning). A sidecar needs no symbols and no text on the law.",
         needs: &["description-is-readable"],
@@ -23,7 +21,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "units-are-known",
-        family: Family::Description,
         description: "Units are made of kPa, kN, kJ, m, mm, s, h, d, deg, rad, 1 and - (warning, \
                       with the probable unit).",
         needs: &["description-is-readable"],
@@ -31,7 +28,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "ranges-are-plausible",
-        family: Family::Description,
         description: "Usual ranges and defaults are within the bounds; angles and their usual \
                       ranges are in degrees (warning).",
         needs: &["description-is-readable"],
@@ -133,13 +129,16 @@ fn units_are_known(subject: &Subject) -> Found {
     all_well(&strange)
 }
 
+/// What stands between the factors of a unit.
+pub(super) const SEPARATORS: [char; 4] = ['/', '·', '*', ' '];
+
 const KNOWN: [&str; 12] = [
     "kPa", "kN", "kJ", "m", "mm", "s", "h", "d", "deg", "rad", "1", "-",
 ];
 
 /// Products and quotients of powers of known units.
 fn is_unit(text: &str) -> bool {
-    text.split(['/', '·', '*', ' '])
+    text.split(SEPARATORS)
         .all(|factor| KNOWN.contains(&factor.split('^').next().unwrap_or_default()))
 }
 
@@ -172,35 +171,17 @@ const OTHER_SCALE: [(&str, &str); 6] = [
 
 /// A factor in the spelling of the contract.
 fn spelled(factor: &str) -> Option<String> {
-    let plain: String = factor
-        .chars()
-        .map(|c| match c {
-            '²' => '2',
-            '³' => '3',
-            other => other,
-        })
-        .collect();
+    let plain = factor.replace('²', "2").replace('³', "3");
     let digits = plain.find(|c: char| c.is_ascii_digit() || c == '^' || c == '-');
     let (name, power) = plain.split_at(digits.filter(|&at| at > 0).unwrap_or(plain.len()));
     let power = power.trim_start_matches('^');
-    let listed = |table: &[(&str, &'static str)]| {
-        let mut rows = table.iter();
-        rows.find(|(known, _)| known.eq_ignore_ascii_case(name))
-            .map(|(_, right)| *right)
-    };
-    let exactly = |table: &[(&str, &'static str)]| {
-        let mut rows = table.iter();
-        rows.find(|(known, _)| *known == name)
-            .map(|(_, right)| *right)
-    };
-    let known = KNOWN.iter().find(|known| **known == name).copied();
-    let known = known
-        .or_else(|| listed(&NAMES))
-        .or_else(|| exactly(&OTHER_SCALE))
-        .or_else(|| {
-            let mut all = KNOWN.iter();
-            all.find(|known| known.eq_ignore_ascii_case(name)).copied()
-        })?;
+    let is_alike = |known: &str| known.eq_ignore_ascii_case(name);
+    let mut names = NAMES.into_iter();
+    let mut scales = OTHER_SCALE.into_iter();
+    let known = (KNOWN.into_iter().find(|known| *known == name))
+        .or_else(|| Some(names.find(|(known, _)| is_alike(known))?.1))
+        .or_else(|| Some(scales.find(|(known, _)| *known == name)?.1))
+        .or_else(|| KNOWN.into_iter().find(|known| is_alike(known)))?;
     Some(if power.is_empty() {
         known.to_owned()
     } else {
@@ -210,20 +191,12 @@ fn spelled(factor: &str) -> Option<String> {
 
 /// The unit that was probably meant, in the spelling of the contract.
 fn meant(text: &str) -> Option<String> {
-    let mut right = String::new();
-    let mut factor = String::new();
-    for c in text.trim().chars().chain(['\0']) {
-        if ['/', '·', '*', ' ', '\0'].contains(&c) {
-            right.push_str(&spelled(&factor)?);
-            factor.clear();
-            if c != '\0' {
-                right.push(c);
-            }
-        } else {
-            factor.push(c);
-        }
-    }
-    is_unit(&right).then_some(right)
+    let right = text.trim().split_inclusive(SEPARATORS).map(|piece| {
+        let factor = piece.trim_end_matches(SEPARATORS);
+        Some(spelled(factor)? + &piece[factor.len()..])
+    });
+    let right: Option<String> = right.collect();
+    right.filter(|right| is_unit(right))
 }
 
 /// The largest of a usual range of angles that looks like radians: a little more than π/2.

@@ -91,26 +91,9 @@ impl Subject {
     /// most ordinary one that the law accepts.
     pub(super) fn specimens(
         &self,
-        n_sets: usize,
-        random: &mut Random,
-    ) -> Result<Vec<Specimen>, Verdict> {
-        self.specimens_drawn(n_sets, random, Draw::Any)
-    }
-
-    /// The same with the choices of parameters at their defaults.
-    pub(super) fn specimens_by_default(
-        &self,
-        n_sets: usize,
-        random: &mut Random,
-    ) -> Result<Vec<Specimen>, Verdict> {
-        self.specimens_drawn(n_sets, random, Draw::DefaultChoices)
-    }
-
-    fn specimens_drawn(
-        &self,
-        n_sets: usize,
-        random: &mut Random,
         how: Draw,
+        n_sets: usize,
+        random: &mut Random,
     ) -> Result<Vec<Specimen>, Verdict> {
         if let Some(capsule) = &self.at {
             return Ok(vec![self.specimen_of(capsule)?]);

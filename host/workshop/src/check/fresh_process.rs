@@ -1,6 +1,7 @@
 //! Does a result depend on what came first in its process, or on what the process was told of its surroundings?
 //! Calls are made once more in a process that does nothing else.
 
+use super::draw::Draw;
 use super::in_child::answered;
 use super::points::{UPDATE, fluxes, is_finite, is_success, with_fluxes};
 use super::random::Random;
@@ -154,18 +155,11 @@ fn results(
     let scratch = Scratch::new()?;
     let file = scratch.path().join("calls");
     std::fs::write(&file, serde_json::to_vec(calls).map_err(internal)?).map_err(internal)?;
+    let mut arguments = vec!["check".into(), subject.path.clone().into()];
+    arguments.extend(["--child".into(), file.clone().into(), "--calls".into()]);
     let outcome = child::run(&Work {
-        arguments: vec![
-            "check".into(),
-            subject.path.clone().into(),
-            "--child".into(),
-            file.clone().into(),
-            "--calls".into(),
-        ],
-        folder: None,
         variables: variables.to_vec(),
-        time: PATIENCE,
-        memory: None,
+        ..Work::new(arguments, PATIENCE)
     })
     .map_err(internal)?;
     let answer = file::read_text(&answered(&file)).ok();
@@ -210,7 +204,7 @@ fn repeated(subject: &Subject, call: &KeptCall) -> Result<Vec<String>, Verdict> 
 
 pub(super) fn independent_of_first_instance(subject: &Subject) -> Found {
     let mut random = Random::new(subject.seed, "first instance");
-    let specimens = subject.specimens(2, &mut random)?;
+    let specimens = subject.specimens(Draw::Any, 2, &mut random)?;
     if specimens.len() < 2 {
         return Err(skipped(
             "there is one set of parameters, and nothing comes before it",
@@ -237,7 +231,7 @@ pub(super) fn independent_of_first_instance(subject: &Subject) -> Found {
 
 pub(super) fn independent_of_environment(subject: &Subject) -> Found {
     let mut random = Random::new(subject.seed, "environment");
-    let specimens = subject.specimens(1, &mut random)?;
+    let specimens = subject.specimens(Draw::Any, 1, &mut random)?;
     let mut here = Vec::new();
     for specimen in &specimens {
         here.extend(Here::of(specimen, &specimen.points(N, &mut random)?)?);

@@ -231,12 +231,11 @@ pub(super) fn ask(
     all.extend(arguments.of_one(check));
     all.extend(["--child".into(), calls.clone().into()]);
     all.extend(is_near.then(|| OsString::from("--near")));
+    let time = Duration::from_secs_f64(arguments.time_limit);
     let outcome = child::run(&Work {
-        arguments: all.clone(),
         folder: Some(folder.clone()),
-        variables: Vec::new(),
-        time: Duration::from_secs_f64(arguments.time_limit),
         memory: Some(MEMORY),
+        ..Work::new(all.clone(), time)
     })
     .map_err(internal)?;
     let answer = file::read_text(&answered(&calls)).ok();

@@ -1,10 +1,12 @@
 //! Do parameters mean something, and numbers what their units say?
 
+use super::description::SEPARATORS;
+use super::draw::Draw;
 use super::loading_path::{Step, flux_scale, some};
 use super::mathematics::NEEDS;
 use super::points::{ELASTIC, ITERATED, UPDATE, apart, increment, is_same, is_success, largest};
 use super::specimen::Specimen;
-use super::{Check, Family, Found, Subject, Verdict, counted, warned};
+use super::{Check, Found, Subject, Verdict, counted, warned};
 use abi::raw;
 use law::ParameterDescription;
 use law::probe::{Form, PointEnd, PointStart, Probe};
@@ -13,7 +15,6 @@ use std::collections::BTreeMap;
 pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "parameters-matter",
-        family: Family::Mathematics,
         description: "Every parameter changes some result; none with a unit or a fractional \
                       default is rounded to a whole number (warning, since some count only off \
                       these paths).",
@@ -22,7 +23,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "units-belong-together",
-        family: Family::Mathematics,
         description: "With units of force, length or time half as large a law gives the same \
                       results: no hidden number has a unit that no parameter has, as a tolerance \
                       in kPa (warning). A parameter with this unit and a default, or a sentence \
@@ -124,7 +124,7 @@ struct Tried {
 
 fn parameters_matter(subject: &Subject) -> Found {
     let mut found: BTreeMap<(String, String), Tried> = BTreeMap::new();
-    subject.each_by_default("parameters", 4, |specimen, random| {
+    subject.each(Draw::DefaultChoices, "parameters", 4, |specimen, random| {
         let steps = specimen.paths(24, random)?.steps;
         let chosen = some(&steps, 400).into_iter();
         let pressures = [1.0, 30.0, 1000.0];
@@ -255,7 +255,7 @@ impl Smaller {
         let mut divides = false;
         let mut rest = unit;
         loop {
-            let end = rest.find(['/', '·', '*', ' ']).unwrap_or(rest.len());
+            let end = rest.find(SEPARATORS).unwrap_or(rest.len());
             let (name, power) = match rest[..end].split_once('^') {
                 Some((name, power)) => (name, power.parse::<f64>().ok()?),
                 None => (&rest[..end], 1.0),
@@ -283,7 +283,7 @@ impl Smaller {
 fn units_belong_together(subject: &Subject) -> Found {
     let mut unknown = 0;
     let mut meant: Vec<String> = Vec::new();
-    let n = subject.each_by_default("units", 3, |specimen, random| {
+    let n = subject.each(Draw::DefaultChoices, "units", 3, |specimen, random| {
         let steps = specimen.paths(24, random)?.steps;
         let mut n = 0;
         for smaller in SMALLER {

@@ -1,34 +1,30 @@
 //! Can the file be opened, and is it of this contract?
 
-use super::{Check, Family, Found, Subject, failed, skipped, warned};
+use super::{Check, Found, Subject, failed, skipped, warned};
 use law::probe;
 use object::{Architecture, BinaryFormat, Object, ObjectKind, ObjectSection};
 
 pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "file-is-a-library",
-        family: Family::Load,
         description: "The file is a shared library for this system and processor. Nothing is run.",
         needs: &[],
         run: file_is_a_library,
     },
     Check {
         id: "library-opens",
-        family: Family::Load,
         description: "The library opens, and all symbols it needs are found.",
         needs: &["file-is-a-library"],
         run: library_opens,
     },
     Check {
         id: "handshake-is-accepted",
-        family: Family::Load,
         description: "`pilum_magic` is there and fits this host.",
         needs: &["library-opens"],
         run: handshake_is_accepted,
     },
     Check {
         id: "entry-is-idempotent",
-        family: Family::Load,
         description: "`pilum_entry` returns the same pointer again, from another thread, and to \
                       a host with a longer description.",
         needs: &["handshake-is-accepted"],
@@ -36,7 +32,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "exports-are-hidden",
-        family: Family::Load,
         description: "The library exports only the symbols of the contract, or of UMAT, MFront \
                       or CalculiX; others could disturb other libraries (warning).",
         needs: &["file-is-a-library"],
@@ -44,7 +39,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "manifest-matches",
-        family: Family::Load,
         description: "A manifest lists the laws of the description with their versions.",
         needs: &["description-is-readable"],
         run: manifest_matches,

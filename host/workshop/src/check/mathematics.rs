@@ -11,7 +11,7 @@ pub(super) use axes::{routine_agrees_in_the_plane, tangential_directions_are_ali
 pub(super) use rest::{counts, routine_stays_at_rest};
 pub(super) use tangent::ddsdde_matches_differences;
 
-use super::{Check, Family};
+use super::Check;
 
 pub(super) const NEEDS: &[&str] = &[
     "repeatable",
@@ -25,7 +25,6 @@ pub(super) const NEEDS: &[&str] = &[
 pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "tangent-matches-differences",
-        family: Family::Mathematics,
         description: "The consistent tangent is the derivative of the update within 10⁻⁴ of the \
                       elastic stiffness, on all paths. Exempt are kinks, where differences to \
                       the two sides disagree, and laws that declare an approximate tangent or \
@@ -35,7 +34,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "rates-match-differences",
-        family: Family::Mathematics,
         description: "With PILUM_T_RATES, rates of flux and internal variables are the \
                       derivative of the update in random directions, by parameters too, within \
                       10⁻⁶ of the largest term; kinks are exempt.",
@@ -44,7 +42,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "tangent-symmetry-as-declared",
-        family: Family::Mathematics,
         description: "With PILUM_T_SYMMETRIC the consistent tangent is symmetric on random \
                       paths.",
         needs: NEEDS,
@@ -52,7 +49,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "linearity-as-declared",
-        family: Family::Mathematics,
         description: "With PILUM_T_LINEAR one tangent holds for all states and predicts every \
                       update.",
         needs: NEEDS,
@@ -60,7 +56,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "zero-increment-changes-nothing",
-        family: Family::Mathematics,
         description: "After an update, a zero increment keeps flux and internal variables, also \
                       300 times. Exempt: laws that depend on time, counters and rates.",
         needs: NEEDS,
@@ -68,7 +63,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "initial-states-fit",
-        family: Family::Mathematics,
         description: "A zero increment keeps initial flux and the internal variables that \
                       `init_state` fits to it (warning, since a law may not carry that flux).",
         needs: NEEDS,
@@ -76,7 +70,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "hypotheses-agree",
-        family: Family::Mathematics,
         description: "Plane strain and axisymmetry give the stresses of 3D (without 3D: each \
                       other's); interfaces in two dimensions those of three.",
         needs: NEEDS,
@@ -84,7 +77,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "tangential-axis-is-arbitrary",
-        family: Family::Mathematics,
         description: "With the tangential axis of an interface reversed, the traction is \
                       reversed (warning, since the `doc` may say otherwise).",
         needs: NEEDS,
@@ -92,7 +84,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "response-is-isotropic",
-        family: Family::Mathematics,
         description: "In rotated axes a solid gives rotated stresses; it does not with γ = 2ε \
                       taken for ε. PILUM_T_LOCAL_AXES is exempt (warning, since a law may have \
                       directions).",
@@ -101,7 +92,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "compression-is-negative",
-        family: Family::Mathematics,
         description: "A law carries no more shear under tension than under equal compression \
                       (warning, since some may).",
         needs: NEEDS,
@@ -109,7 +99,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "angles-are-degrees",
-        family: Family::Mathematics,
         description: "Parameters in deg do not repeat after 2π, as radians do, nor after 2π · \
                       π/180.",
         needs: NEEDS,
@@ -117,7 +106,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "plastic-work-is-not-negative",
-        family: Family::Mathematics,
         description: "With a constant elastic operator, flux times inelastic increment is not \
                       negative; laws that depend on time are exempt (warning, since hardening \
                       may release energy).",

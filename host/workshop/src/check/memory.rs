@@ -1,15 +1,15 @@
 //! Does a law keep to the memory it is given?
 
+use super::draw::Draw;
 use super::points::{ELASTIC, UPDATE, fluxes, is_finite, is_success};
 use super::specimen::create_form;
-use super::{Check, Family, Found, Subject, Verdict, skipped};
+use super::{Check, Found, Subject, Verdict, skipped};
 use abi::raw;
 use law::probe::{Fence, Form, Order, process};
 
 pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "writes-stay-inside",
-        family: Family::Memory,
         description: "Nothing is written outside the outputs, nor between their cells. Forbidden \
                       memory is right after, then right before every output; touching it crashes \
                       the check.",
@@ -18,21 +18,18 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "reads-stay-inside",
-        family: Family::Memory,
         description: "Nothing is read outside the inputs; forbidden memory as for the outputs.",
         needs: &["integrate-works"],
         run: reads_stay_inside,
     },
     Check {
         id: "inputs-stay-untouched",
-        family: Family::Memory,
         description: "Inputs are in memory that cannot be written; a write crashes the check.",
         needs: &["integrate-works"],
         run: inputs_stay_untouched,
     },
     Check {
         id: "results-are-finite",
-        family: Family::Memory,
         description: "With success every requested component is written (NaN before the call) \
                       and finite.",
         needs: &["integrate-works"],
@@ -40,7 +37,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "memory-is-freed",
-        family: Family::Memory,
         description: "Heap and mapped memory do not grow with calls of `integrate` and \
                       `init_state`, good or failing, nor with instances created, destroyed or \
                       refused.",
@@ -54,7 +50,7 @@ const REQUESTS: [u32; 3] = [raw::PILUM_REQ_FLUX, UPDATE, ELASTIC];
 
 /// Calls of both functions in a form, on points of paths. The number of points.
 fn in_form(subject: &Subject, name: &str, change: impl Fn(&mut Form)) -> Result<usize, Verdict> {
-    subject.each(name, 2, |specimen, random| {
+    subject.each(Draw::Any, name, 2, |specimen, random| {
         // An odd number, so that arrays of outcomes do not fill whole words.
         let points = specimen.points(33, random)?;
         let mut n_points = 0;
@@ -111,7 +107,7 @@ fn inputs_stay_untouched(subject: &Subject) -> Found {
 }
 
 fn results_are_finite(subject: &Subject) -> Found {
-    let n = subject.each("finite", 3, |specimen, random| {
+    let n = subject.each(Draw::Any, "finite", 3, |specimen, random| {
         let walk = specimen.paths(20, random)?;
         let (starts, n) = (walk.successes, walk.steps.len());
         if n < starts.len() {
@@ -150,7 +146,7 @@ fn memory_is_freed(subject: &Subject) -> Found {
     if process::heap_in_use().is_none() {
         return Err(skipped("the system does not tell what is in use"));
     }
-    subject.each("heap", 1, |specimen, random| {
+    subject.each(Draw::Any, "heap", 1, |specimen, random| {
         let point = specimen.points(1, random)?;
         let mut broken = point.clone();
         broken[0].gradient1[0] = f64::NAN;

@@ -4,10 +4,11 @@ mod arguments;
 mod earlier_calls;
 mod environment;
 
+use super::draw::Draw;
 use super::points::{UPDATE, first_difference, increment, is_same};
 use super::random::Random;
 use super::specimen::{BOTH, Specimen, name};
-use super::{Check, Family, Found, Subject, Verdict, fresh_process, skipped};
+use super::{Check, Found, Subject, Verdict, fresh_process, skipped};
 use abi::raw;
 use law::probe::call_log::Function;
 use law::probe::{Form, Order, PointEnd, PointStart};
@@ -16,7 +17,6 @@ use std::time::Instant;
 pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "repeatable",
-        family: Family::Purity,
         description: "The same call gives the same bits, also after other calls. This and the \
                       checks below include `init_state`.",
         needs: &[
@@ -28,7 +28,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "independent-of-split",
-        family: Family::Purity,
         description: "Points give the same bits in one batch, one by one, in batches of random \
                       sizes, and in one of 20 011 points.",
         needs: &["repeatable"],
@@ -36,14 +35,12 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "independent-of-order",
-        family: Family::Purity,
         description: "Points give the same bits in another order.",
         needs: &["independent-of-split"],
         run: |subject| compare(subject, "order", shuffled),
     },
     Check {
         id: "independent-of-request",
-        family: Family::Purity,
         description: "Flux and internal variables have the same bits for every requested \
                       operator, and for every number of the first point (warning, if only last \
                       bits differ without the consistent tangent).",
@@ -52,7 +49,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "independent-of-time",
-        family: Family::Purity,
         description: "Results have the same bits at any time; without a parameter or variable in \
                       a unit of time also for any duration, 0 too (warning, since a law may \
                       age).",
@@ -61,7 +57,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "independent-of-layout",
-        family: Family::Purity,
         description: "Results have the same bits with values by points, by components, with \
                       gaps, or with inputs once for all points.",
         needs: &["independent-of-split"],
@@ -69,7 +64,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "independent-of-thread",
-        family: Family::Purity,
         description: "Eight threads that use one instance at the same time get the same bits as \
                       one.",
         needs: &["repeatable"],
@@ -77,7 +71,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "instances-are-independent",
-        family: Family::Purity,
         description: "An instance gives the same bits while others are created, used and \
                       destroyed.",
         needs: &["repeatable"],
@@ -85,7 +78,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "independent-of-earlier-calls",
-        family: Family::Purity,
         description: "A call gives the same bits after one that differs in a single input, \
                       parameter, request or the time increment, by a half or by 10⁻⁹, and in an \
                       instance at the address of another one.",
@@ -94,7 +86,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "independent-of-first-instance",
-        family: Family::Purity,
         description: "An instance gives the same bits as the first one of a process and after \
                       one with other parameters: no `static` keeps the first values.",
         needs: &["independent-of-order", "independent-of-earlier-calls"],
@@ -102,7 +93,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "independent-of-environment",
-        family: Family::Purity,
         description: "A process with other HOME, LANG, LC_ALL, TZ, USER and LOGNAME gives the \
                       same bits.",
         needs: &["independent-of-first-instance"],
@@ -110,7 +100,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "environment-is-left-alone",
-        family: Family::Purity,
         description: "Rounding, subnormal numbers, arithmetic traps, locale, working directory, \
                       signal handlers, alarms, limits, umask and environment stay; no process is \
                       started, no thread or open file left behind, none closed.",
@@ -119,14 +108,12 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "prints-nothing",
-        family: Family::Purity,
         description: "Nothing is written to the standard output or the error stream.",
         needs: &["integrate-works"],
         run: |subject| environment::drive(subject).map(|()| String::new()),
     },
     Check {
         id: "writes-no-files",
-        family: Family::Purity,
         description: "No file is left in the working directory.",
         needs: &["integrate-works"],
         run: |subject| environment::drive(subject).map(|()| String::new()),
@@ -168,7 +155,7 @@ fn compare(
     name: &str,
     mut other: impl FnMut(&Called<'_>, &[PointStart], &mut Random) -> Result<Vec<PointEnd>, Verdict>,
 ) -> Found {
-    let n = subject.each(name, 3, |specimen, random| {
+    let n = subject.each(Draw::Any, name, 3, |specimen, random| {
         let points = specimen.points(96, random)?;
         for function in BOTH {
             let called = Called { specimen, function };

@@ -36,6 +36,15 @@ pub(super) struct Finding {
     pub(super) is_well_nearby: bool,
 }
 
+/// An entry of the list of checks.
+#[derive(Serialize)]
+struct Entry {
+    id: &'static str,
+    family: Family,
+    description: &'static str,
+    needs: &'static [&'static str],
+}
+
 #[derive(Serialize)]
 pub(super) struct Report<'a> {
     pub(super) library: String,
@@ -49,7 +58,7 @@ impl Finding {
     pub(super) fn new(check: &'static Check, outcome: Outcome, details: String) -> Self {
         Self {
             id: check.id,
-            family: check.family,
+            family: check.family(),
             description: check.description,
             outcome,
             details,
@@ -116,7 +125,13 @@ pub(super) fn json(value: &impl Serialize) -> Result<String, Error> {
 
 pub(super) fn list(as_json: bool) -> Result<String, Error> {
     if as_json {
-        let all: Vec<&Check> = checks().collect();
+        let entry = |check: &'static Check| Entry {
+            id: check.id,
+            family: check.family(),
+            description: check.description,
+            needs: check.needs,
+        };
+        let all: Vec<Entry> = checks().map(entry).collect();
         return Ok(format!("{}\n", json(&all)?));
     }
     let line = |check: &Check| format!("{}\n    {}\n", check.id, check.description);

@@ -2,6 +2,7 @@
 //! of the elastic operator.
 
 use super::coverage::beyond_elastic;
+use super::draw::Draw;
 use super::loading_path::{Step, flux_scale, some, starts};
 use super::mathematics::{NEEDS, counts};
 use super::points::{
@@ -10,7 +11,7 @@ use super::points::{
 };
 use super::random::Random;
 use super::specimen::{INSTANT, Specimen};
-use super::{Check, Family, Found, Subject, Verdict, counted, margins};
+use super::{Check, Found, Subject, Verdict, counted, margins};
 use abi::raw;
 use law::Tangent;
 use law::probe::{PointEnd, PointStart};
@@ -19,7 +20,6 @@ use nalgebra::DMatrix;
 pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "elastic-operator-is-plausible",
-        family: Family::Mathematics,
         description: "The elastic operator is symmetric, has no negative stiffness, and is the \
                       consistent tangent of some very small increments, if need be in no time or \
                       in very long times (warning).",
@@ -28,7 +28,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "response-is-continuous",
-        family: Family::Mathematics,
         description: "Along an increment the flux does not jump. Exempt are jumps to or from \
                       zero flux, with a switch of a variable of unit - by a half or more, and up \
                       to 10⁻³ of substeps within plastic flow, which are reported (warning, \
@@ -38,7 +37,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "states-are-carried-on",
-        family: Family::Mathematics,
         description: "No internal variable is halved when an increment is divided in two, and \
                       again in four, as if not added to its initial value; counters and times \
                       are exempt (warning, since a law may keep the last increment's).",
@@ -47,7 +45,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "plastic-variables-rest",
-        family: Family::Mathematics,
         description: "An internal variable called plastic by its id or sentence does not change \
                       in an elastic increment; laws that depend on time are exempt (warning).",
         needs: NEEDS,
@@ -77,7 +74,7 @@ fn small_increments(specimen: &Specimen, steps: &[Step], random: &mut Random) ->
 }
 
 fn elastic_operator_is_plausible(subject: &Subject) -> Found {
-    let n = subject.each_by_default("elastic", 3, |specimen, random| {
+    let n = subject.each(Draw::DefaultChoices, "elastic", 3, |specimen, random| {
         let steps = specimen.paths(24, random)?.steps;
         let points = small_increments(specimen, &steps, random);
         let elastic = specimen.call(&points, ELASTIC)?.points;
@@ -307,7 +304,7 @@ fn suspicious<'a>(specimen: &Specimen, steps: &[&'a Step]) -> Result<Vec<Piece<'
 
 fn response_is_continuous(subject: &Subject) -> Found {
     let mut rough = 0.0_f64;
-    let n = subject.each_by_default("jumps", 4, |specimen, random| {
+    let n = subject.each(Draw::DefaultChoices, "jumps", 4, |specimen, random| {
         let steps = specimen.paths(24, random)?.steps;
         let chosen = some(&steps, 120);
         for piece in &suspicious(specimen, &chosen)? {
@@ -340,7 +337,7 @@ const HALF: f64 = 0.02;
 const SEEN: usize = 3;
 
 fn states_are_carried_on(subject: &Subject) -> Found {
-    let n = subject.each_by_default("halves", 3, |specimen, random| {
+    let n = subject.each(Draw::DefaultChoices, "halves", 3, |specimen, random| {
         let variables = &specimen.formulation.internal_variables;
         if variables.is_empty() {
             return Ok(0);
@@ -415,7 +412,7 @@ fn is_called_plastic(id: &str, doc: &str) -> bool {
 }
 
 fn plastic_variables_rest(subject: &Subject) -> Found {
-    let n = subject.each_by_default("plastic variables", 3, |specimen, random| {
+    let n = subject.each(Draw::DefaultChoices, "plastic variables", 3, |specimen, random| {
         let variables = specimen.formulation.internal_variables.iter().enumerate();
         let plastic: Vec<(usize, &str)> = variables
             .filter(|(_, v)| is_called_plastic(&v.id, &v.doc))

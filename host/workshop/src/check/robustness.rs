@@ -1,7 +1,8 @@
 //! Does a law survive what no law should be given?
 
+use super::draw::Draw;
 use super::points::{UPDATE, first_difference, increment, is_finite, is_success};
-use super::{Check, Family, Found, Subject, status_name};
+use super::{Check, Found, Subject, status_name};
 use abi::raw;
 use abi::status::Outcome;
 use law::probe::{Answer, PointStart};
@@ -9,21 +10,18 @@ use law::probe::{Answer, PointStart};
 pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "bad-numbers-are-refused",
-        family: Family::Robustness,
         description: "NaN or an infinity in any input gives PILUM_E_NUMERIC.",
         needs: &["results-are-finite", "writes-stay-inside"],
         run: bad_numbers_are_refused,
     },
     Check {
         id: "failing-points-stay-alone",
-        family: Family::Robustness,
         description: "A failing point changes no bit of the others.",
         needs: &["independent-of-split", "bad-numbers-are-refused"],
         run: failing_points_stay_alone,
     },
     Check {
         id: "huge-steps-end-well",
-        family: Family::Robustness,
         description: "Increments up to 10¹² times the elastic limit succeed with finite results, \
                       ask for a smaller step or fail with a message; a step factor is NaN or in \
                       (0, 1).",
@@ -40,7 +38,7 @@ fn bad_numbers_are_refused(subject: &Subject) -> Found {
         ("flux0", |p| &mut p.flux0),
         ("state0", |p| &mut p.state0),
     ];
-    let n = subject.each("bad numbers", 1, |specimen, random| {
+    let n = subject.each(Draw::Any, "bad numbers", 1, |specimen, random| {
         let points = specimen.points(2, random)?;
         let mut n = 0;
         for (input, values) in inputs {
@@ -65,7 +63,7 @@ fn bad_numbers_are_refused(subject: &Subject) -> Found {
 }
 
 fn failing_points_stay_alone(subject: &Subject) -> Found {
-    subject.each("failing", 1, |specimen, random| {
+    subject.each(Draw::Any, "failing", 1, |specimen, random| {
         let points = specimen.points(9, random)?;
         let expected = specimen.call(&points, UPDATE)?.points;
         for at in 0..points.len() {
@@ -91,7 +89,7 @@ fn failing_points_stay_alone(subject: &Subject) -> Found {
 
 fn huge_steps_end_well(subject: &Subject) -> Found {
     let mut n_successes = 0;
-    let n = subject.each("huge", 4, |specimen, random| {
+    let n = subject.each(Draw::Any, "huge", 4, |specimen, random| {
         let points = specimen.points(48, random)?;
         for point in &points {
             let factor = random.logarithmic(10.0, 1e12);

@@ -7,14 +7,13 @@ mod outside_reads;
 mod phase_start;
 mod time;
 
+use super::draw::Draw;
 use super::draw::is_known;
 use super::loading_path::{Refused, Step, starts};
 use super::points::{UPDATE, at_rest, bits, first_difference, is_success, largest};
 use super::random::Random;
 use super::specimen::{LONG, Specimen};
-use super::{
-    Check, Family, Found, Subject, Verdict, author_path, mathematics, refusal, skipped, warned,
-};
+use super::{Check, Found, Subject, Verdict, author_path, mathematics, refusal, skipped, warned};
 use crate::Error;
 use abi::status::Outcome;
 use law::foreign::{Adapter, sidecar, sidecar_of};
@@ -28,7 +27,6 @@ use text::Source;
 pub(super) const CHECKS: &[Check] = &[
     Check {
         id: "sidecar-is-read",
-        family: Family::Routine,
         description: "UMAT (or UDSM, MFront along a driver): its sidecar, or that of the driver, \
                       is readable; parameters have a default, a usual range, or are set \
                       (warning).",
@@ -37,7 +35,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "routine-answers",
-        family: Family::Routine,
         description: "UMAT: for every hypothesis of the sidecar the routine is found with all \
                       that it calls, and a first call without strain gives finite results.",
         needs: &["sidecar-is-read"],
@@ -45,7 +42,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "routine-stays-inside",
-        family: Family::Routine,
         description: "UMAT: on random and on far paths nothing is read or written outside \
                       arrays, nor written over sizes, names and PROPS; PNEWDT is sound, results \
                       on random paths are finite, and the process does not end by STOP or XIT. A \
@@ -55,7 +51,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "routine-is-repeatable",
-        family: Family::Routine,
         description: "UMAT: the same call gives the same bits after other calls and in another \
                       image of the library: SAVE or COMMON keep nothing. With other NOEL, NPT, \
                       COORDS and CELENT, too (warning, since they may mean properties).",
@@ -64,7 +59,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "routine-does-not-begin-again",
-        family: Family::Routine,
         description: "UMAT: at the start of a phase, with KINC = 1 and TIME(1) = 0, a routine \
                       goes on from its internal variables: STRESS is the same, also in the next \
                       increment; with KSTEP = 1, too (warning). TIME(1) is a warning if the \
@@ -75,7 +69,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "routine-stays-at-rest",
-        family: Family::Routine,
         description: "UMAT: after an update, DSTRAN = 0 keeps STRESS; routines that depend on \
                       time are exempt.",
         needs: &["routine-is-repeatable"],
@@ -83,7 +76,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "time-as-declared",
-        family: Family::Routine,
         description: "UMAT: DTIME or TIME changes the response if the sidecar has \
                       `time_dependent = true`, and only then (warning).",
         needs: &["routine-is-repeatable"],
@@ -91,7 +83,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "ddsdde-matches-differences",
-        family: Family::Routine,
         description: "UMAT: DDSDDE is the derivative of STRESS within 10⁻⁴ of the stiffness, \
                       also far beyond yielding and in unloading (warning, with the largest \
                       error), not its transpose, and symmetric if declared. Exempt: kinks and \
@@ -101,7 +92,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "routine-agrees-in-the-plane",
-        family: Family::Routine,
         description: "UMAT: with fewer components the routine gives the same: plane strain and \
                       axisymmetry as 3d, interface_2d as interface_3d.",
         needs: &["routine-is-repeatable"],
@@ -109,7 +99,6 @@ pub(super) const CHECKS: &[Check] = &[
     },
     Check {
         id: "tangential-directions-are-alike",
-        family: Family::Routine,
         description: "UMAT: with the tangential directions of an interface turned (in the plane: \
                       reversed), the traction turns alike (warning).",
         needs: &["routine-is-repeatable"],
@@ -194,7 +183,7 @@ pub(super) fn refuse_settings(settings: &[(String, f64)], path: &Path) -> Result
 /// failures.
 pub(super) fn of_response(check: &Check, subject: &Subject) -> Found {
     let mut random = Random::new(subject.seed, "speed");
-    let routines = subject.specimens_by_default(1, &mut random)?;
+    let routines = subject.specimens(Draw::DefaultChoices, 1, &mut random)?;
     if routines.iter().any(|routine| routine.is_led_near) {
         let why = if subject.near {
             "it is not led far".to_owned()
@@ -213,7 +202,7 @@ impl Subject {
         name: &str,
         mut look: impl FnMut(&Specimen, &[Step], &mut Random) -> Result<usize, Verdict>,
     ) -> Result<usize, Verdict> {
-        self.each_by_default(name, 1, |routine, random| {
+        self.each(Draw::DefaultChoices, name, 1, |routine, random| {
             let walk = routine.paths(N_INCREMENTS, random)?;
             if walk.steps.is_empty() {
                 let why = format!("{}: no increment succeeded: {}", routine.name(), walk.why());
@@ -280,7 +269,7 @@ fn under_pressure(routine: &Specimen) -> Result<PointStart, Verdict> {
 fn routine_answers(subject: &Subject) -> Found {
     author_path::is_followed(subject)?;
     let mut all = Vec::new();
-    subject.each_by_default("answers", 1, |routine, _| {
+    subject.each(Draw::DefaultChoices, "answers", 1, |routine, _| {
         let start = match routine.course.iter().flatten().next() {
             Some(first) => PointStart {
                 gradient1: first.gradient0.clone(),
@@ -324,7 +313,7 @@ fn what_is_read(routine: &Specimen, points: &[PointStart]) -> Result<String, Ver
 
 fn routine_stays_inside(subject: &Subject) -> Found {
     let mut overwritten = None;
-    let n = subject.each_by_default("inside", 1, |routine, random| {
+    let n = subject.each(Draw::DefaultChoices, "inside", 1, |routine, random| {
         let near = routine.walk(N_INCREMENTS, random)?;
         let all = routine.paths(N_INCREMENTS, random)?;
         // Far away results may be no numbers: who goes there is told then.
@@ -422,7 +411,11 @@ fn change(routine: &Specimen, before: &PointEnd, after: &PointEnd) -> String {
 }
 
 fn routine_is_repeatable(subject: &Subject) -> Found {
-    let others = subject.specimens_by_default(1, &mut Random::new(subject.seed, "images"))?;
+    let others = subject.specimens(
+        Draw::DefaultChoices,
+        1,
+        &mut Random::new(subject.seed, "images"),
+    )?;
     let mut by_site = None;
     let n = subject.each_walk("repeatable", |routine, steps, random| {
         let fresh = others.iter().find(|other| is_like(other, routine));

@@ -5,7 +5,7 @@ use super::verdict::Outcome;
 use super::{Arguments, Check, Family, Subject, checks, in_child, routine};
 use crate::Error;
 use crate::scratch::Scratch;
-use law::{Opener, Trust};
+use law::Opener;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -41,7 +41,7 @@ impl Schedule {
     /// The checks that this one builds on.
     fn needs(&self, check: &Check) -> &'static [&'static str] {
         // What describes a routine is read first: what is wrong there is told once.
-        if self.is_routine && check.family == Family::Description {
+        if self.is_routine && check.family() == Family::Description {
             &["sidecar-is-read"]
         } else if self.is_routine && routine::OF_RESPONSES.contains(&check.id) {
             &["routine-is-repeatable"]
@@ -107,10 +107,7 @@ pub(super) fn run_apart(arguments: &Arguments, path: &Path) -> Result<Vec<Findin
 /// Runs the checks in this process, one after the other.
 pub(super) fn run_here(arguments: &Arguments, path: &Path) -> Result<Vec<Finding>, Error> {
     // Nothing is tried in a child first: what happens is to happen here.
-    let opener = Opener::new(Trust {
-        probe: false,
-        isolate: None,
-    });
+    let opener = Opener::default();
     let mut schedule = Schedule::new(arguments, path);
     while let Some(&check) = schedule.ready().first() {
         let done = match schedule.missing(check) {

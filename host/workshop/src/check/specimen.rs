@@ -12,6 +12,7 @@ use law::probe::call_log::Function;
 use law::probe::{Answer, CreateForm, Form, PointEnd, PointStart, Probe};
 use law::{
     BatchFailure, FormulationDescription, LoadedLaw, Moment, Operator, PointCall, Request, Site,
+    hypothesis_named,
 };
 use std::fmt::Display;
 use std::sync::OnceLock;
@@ -59,14 +60,8 @@ pub(super) fn name(function: Function) -> &'static str {
 /// Hypotheses a law offers, in the order of its library.
 pub(super) fn hypotheses(law: &LoadedLaw) -> Vec<(FormulationDescription, Hypothesis)> {
     let offered = law.description().formulations.iter();
-    offered
-        .filter_map(|formulation| {
-            let known = Hypothesis::ALL
-                .into_iter()
-                .find(|h| h.name() == formulation.hypothesis)?;
-            Some((formulation.clone(), known))
-        })
-        .collect()
+    let known = |f: &FormulationDescription| Some((f.clone(), hypothesis_named(f.hypothesis)?));
+    offered.filter_map(known).collect()
 }
 
 /// The form of an ordinary `create`.

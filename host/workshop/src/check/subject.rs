@@ -1,5 +1,6 @@
 //! The library that is checked, and how.
 
+use super::draw::Draw;
 use super::random::Random;
 use super::specimen::{Specimen, hypotheses};
 use super::{Arguments, Verdict, author_path, failed, routine};
@@ -91,43 +92,19 @@ impl Subject {
         }))
     }
 
-    /// Looks at every law under every hypothesis with this many sets of any parameters, by random numbers of this
-    /// name. Returns the sum of the counts.
+    /// Looks at every law under every hypothesis with this many sets of parameters, by random numbers of this
+    /// name. Returns the sum of the counts. What was looked at is destroyed before the next one.
     pub(super) fn each(
         &self,
+        how: Draw,
         name: &str,
         n_sets: usize,
-        look: impl FnMut(&Specimen, &mut Random) -> Result<usize, Verdict>,
+        mut look: impl FnMut(&Specimen, &mut Random) -> Result<usize, Verdict>,
     ) -> Result<usize, Verdict> {
         let mut random = Random::new(self.seed, name);
-        let specimens = self.specimens(n_sets, &mut random)?;
-        sum(specimens, &mut random, look)
+        let specimens = self.specimens(how, n_sets, &mut random)?.into_iter();
+        specimens.map(|specimen| look(&specimen, &mut random)).sum()
     }
-
-    /// The same with the choices of parameters at their defaults.
-    pub(super) fn each_by_default(
-        &self,
-        name: &str,
-        n_sets: usize,
-        look: impl FnMut(&Specimen, &mut Random) -> Result<usize, Verdict>,
-    ) -> Result<usize, Verdict> {
-        let mut random = Random::new(self.seed, name);
-        let specimens = self.specimens_by_default(n_sets, &mut random)?;
-        sum(specimens, &mut random, look)
-    }
-}
-
-/// The sum of what is counted for each; what was looked at is destroyed before the next one.
-fn sum(
-    specimens: Vec<Specimen>,
-    random: &mut Random,
-    mut look: impl FnMut(&Specimen, &mut Random) -> Result<usize, Verdict>,
-) -> Result<usize, Verdict> {
-    let mut n = 0;
-    for specimen in specimens {
-        n += look(&specimen, random)?;
-    }
-    Ok(n)
 }
 
 /// Why a library or its sidecar cannot be used, on one line: with file and line, where there is one, and what the

@@ -7,7 +7,7 @@ use abi::Hypothesis;
 use law::capsule::LibraryCapsule;
 use law::probe::call_log::Phase;
 use law::trial::plausible;
-use law::{LoadedLaw, Opener, Trust, hexadecimal_sha256, probe};
+use law::{LoadedLaw, Opener, hexadecimal_sha256, probe};
 use std::path::Path;
 use std::sync::Arc;
 use text::file;
@@ -86,10 +86,7 @@ fn inside(capsule: &LibraryCapsule, report: &mut Report<'_>) -> Result<(), Error
 
 /// The laws of the library, called in this process.
 fn laws(capsule: &LibraryCapsule) -> Result<Vec<LoadedLaw>, Error> {
-    let opener = Opener::new(Trust {
-        probe: false,
-        isolate: None,
-    });
+    let opener = Opener::default();
     let library = match capsule.library.foreign() {
         Some(foreign) => opener.open_foreign(&foreign, |_| Ok(()))?,
         None => opener.open(&capsule.library.path)?,

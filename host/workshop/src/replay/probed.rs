@@ -11,7 +11,7 @@ use abi::Hypothesis;
 use law::capsule::Capsule;
 use law::probe::call_log::Function;
 use law::probe::{Answer, Form, PointEnd, PointStart, Probe};
-use law::{FormulationDescription, LoadedLaw, Opener, Trust};
+use law::{FormulationDescription, LoadedLaw, Opener};
 use std::path::Path;
 use std::time::Duration;
 
@@ -24,11 +24,7 @@ pub(super) fn replay(
 ) -> Result<(), Error> {
     let Some(limit) = opener.trust().isolate else {
         // Nothing is tried in a child first: what happens is to happen here.
-        let opener = Opener::new(Trust {
-            probe: false,
-            isolate: None,
-        });
-        return inside(capsule, &super::find(capsule, &opener)?, report);
+        return inside(capsule, &super::find(capsule, &Opener::default())?, report);
     };
     let law = &capsule.law;
     report.say(&format!(

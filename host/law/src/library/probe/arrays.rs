@@ -1,6 +1,6 @@
 //! Arrays of a call, whose neighbourhood, layout and protection are chosen.
 
-use super::super::{NOTHING, NOWHERE};
+use super::super::NOTHING;
 use super::pages::Pages;
 use super::{
     Answer, EndRates, Fence, Form, Function, NO_OUTCOME, Order, PointEnd, PointRates, PointStart,
@@ -77,12 +77,8 @@ impl Array {
             .any(|(value, is_cell)| !is_cell && value.to_bits() != UNWRITTEN.to_bits())
     }
 
-    fn is_nothing(&self) -> bool {
-        self.n_points == 0 || self.n_components == 0
-    }
-
     pub(super) fn view(&self) -> View {
-        if self.is_nothing() {
+        if self.n_points == 0 || self.n_components == 0 {
             return NOTHING;
         }
         View {
@@ -93,13 +89,11 @@ impl Array {
     }
 
     pub(super) fn view_mut(&self) -> ViewMut {
-        if self.is_nothing() {
-            return NOWHERE;
-        }
+        let view = self.view();
         ViewMut {
-            p: self.pages.pointer().cast(),
-            point: self.point as isize,
-            component: self.component as isize,
+            p: view.p.cast_mut(),
+            point: view.point,
+            component: view.component,
         }
     }
 }

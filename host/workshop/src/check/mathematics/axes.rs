@@ -1,5 +1,6 @@
 //! Do hypotheses agree, and does the response turn with the axes?
 
+use crate::check::draw::Draw;
 use crate::check::loading_path::{Origin, Step, flux_scale};
 use crate::check::points::{
     ELASTIC, ITERATED, ROUND_OFF, apart, carry_on, enlarged, is_success, largest, longer, sum,
@@ -14,7 +15,7 @@ use law::probe::PointStart;
 use nalgebra::{DMatrix, DVector};
 
 pub(super) fn hypotheses_agree(subject: &Subject) -> Found {
-    let n = subject.each_by_default("hypotheses", 3, |specimen, random| {
+    let n = subject.each(Draw::DefaultChoices, "hypotheses", 3, |specimen, random| {
         agrees(specimen, || Ok(specimen.paths(24, random)?.steps))
     })?;
     counted(n, "points", "no law offers two hypotheses of one kind")
@@ -300,7 +301,7 @@ fn turned_alike(
 ) -> Result<usize, Verdict> {
     let mut random = Random::new(subject.seed, name);
     let mut n = 0;
-    for mut specimen in subject.specimens_by_default(n_sets, &mut random)? {
+    for mut specimen in subject.specimens(Draw::DefaultChoices, n_sets, &mut random)? {
         if !specimen.hypothesis.is_interface() {
             continue;
         }
@@ -328,7 +329,7 @@ pub(in crate::check) fn tangential_directions_are_alike(subject: &Subject) -> Fo
 pub(super) fn response_is_isotropic(subject: &Subject) -> Found {
     let mut random = Random::new(subject.seed, "isotropy");
     let mut n = 0;
-    for mut specimen in subject.specimens_by_default(4, &mut random)? {
+    for mut specimen in subject.specimens(Draw::DefaultChoices, 4, &mut random)? {
         let components = specimen.probe.n_components();
         if components < 4 || specimen.formulation.local_axes {
             continue;

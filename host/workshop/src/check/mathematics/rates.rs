@@ -1,6 +1,7 @@
 //! Are rates the derivative of the update?
 
 use super::LENGTHS;
+use crate::check::draw::Draw;
 use crate::check::loading_path::Step;
 use crate::check::points::{increment, is_success, largest};
 use crate::check::random::Random;
@@ -16,7 +17,7 @@ const RATE: f64 = 1e-6;
 
 pub(super) fn rates_match_differences(subject: &Subject) -> Found {
     let mut n_kinks = 0;
-    let n = subject.each_by_default("rates", 4, |specimen, random| {
+    let n = subject.each(Draw::DefaultChoices, "rates", 4, |specimen, random| {
         // They are asked for over an increment of one unit of time.
         if !specimen.formulation.rates || specimen.time_increment.to_bits() != 1.0_f64.to_bits() {
             return Ok(0);

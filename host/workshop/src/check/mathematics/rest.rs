@@ -1,6 +1,7 @@
 //! Does a point that does not move stay where it is? If not: what has the increment before that left unreturned?
 
 use crate::check::coverage::beyond_elastic;
+use crate::check::draw::Draw;
 use crate::check::loading_path::{Origin, Step, flux_scale, starts};
 use crate::check::points::{
     ELASTIC, ITERATED, UPDATE, apart, at_rest, first_difference, increment, is_finite, is_success,
@@ -19,7 +20,7 @@ fn resting(steps: &[Step]) -> Vec<PointStart> {
 }
 
 pub(super) fn zero_increment_changes_nothing(subject: &Subject) -> Found {
-    let n = subject.each_by_default("zero", 4, |specimen, random| {
+    let n = subject.each(Draw::DefaultChoices, "zero", 4, |specimen, random| {
         let steps = specimen.paths(30, random)?.steps;
         let slower = specimen.lasting(10.0, &starts(&steps), raw::PILUM_REQ_FLUX)?;
         let pairs = || steps.iter().zip(&slower);
@@ -259,7 +260,7 @@ fn sheared(specimen: &Specimen, random: &mut Random) -> Result<Vec<Rest>, Verdic
 }
 
 pub(super) fn initial_states_fit(subject: &Subject) -> Found {
-    let n = subject.each_by_default("initial fluxes", 4, |specimen, random| {
+    let n = subject.each(Draw::DefaultChoices, "initial fluxes", 4, |specimen, random| {
         if specimen.course.is_some() || specimen.probe.init_state(&[], &Form::of(0))?.is_none() {
             return Ok(0);
         }

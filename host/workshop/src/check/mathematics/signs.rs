@@ -1,5 +1,6 @@
 //! Are signs, angles and work what they are meant to be?
 
+use crate::check::draw::Draw;
 use crate::check::loading_path::{Origin, Step, flux_scale, starts};
 use crate::check::points::{
     ELASTIC, ITERATED, ROUND_OFF, apart, carry_on, increment, is_success, largest,
@@ -15,7 +16,7 @@ const STRONGER: f64 = 1.05;
 
 pub(super) fn compression_is_negative(subject: &Subject) -> Found {
     const PRESSURES: [f64; 3] = [10.0, 100.0, 1000.0];
-    let n = subject.each_by_default("compression", 4, |specimen, _| {
+    let n = subject.each(Draw::DefaultChoices, "compression", 4, |specimen, _| {
         // A replay goes the ways of the whole check, in which nothing is random.
         if specimen.course.is_some() && subject.at.is_none() {
             return Err(skipped("the path is the author's"));
@@ -97,7 +98,7 @@ const PERIODS: [f64; 2] = [
 ];
 
 pub(super) fn angles_are_degrees(subject: &Subject) -> Found {
-    let n = subject.each_by_default("angles", 3, |specimen, random| {
+    let n = subject.each(Draw::DefaultChoices, "angles", 3, |specimen, random| {
         let parameters = specimen.law.description().parameters.iter().enumerate();
         let is_angle = |(i, p): &(usize, &law::ParameterDescription)| {
             p.unit == "deg" && specimen.values[*i].is_finite()
@@ -159,7 +160,7 @@ fn effect(specimen: &Specimen, steps: &[Step], i: usize, by: f64) -> Result<Opti
 pub(super) fn plastic_work_is_not_negative(subject: &Subject) -> Found {
     let mut least = -1e-6;
     let mut worst = None;
-    let n = subject.each_by_default("work", 4, |specimen, random| {
+    let n = subject.each(Draw::DefaultChoices, "work", 4, |specimen, random| {
         let steps = specimen.paths(36, random)?.steps;
         let elastic = specimen.call(&starts(&steps), ELASTIC)?.points;
         let Some(first) = elastic.first() else {

@@ -1,6 +1,7 @@
 //! Is the consistent tangent the derivative of the update, symmetric and constant where that is declared?
 
 use super::slope::{Entry, Slope, TANGENT, slope};
+use crate::check::draw::Draw;
 use crate::check::loading_path::{Step, flux_scale, starts};
 use crate::check::points::{ELASTIC, ROUND_OFF, apart, increment, largest};
 use crate::check::specimen::Specimen;
@@ -88,7 +89,7 @@ impl Tally {
 
 pub(super) fn tangent_matches_differences(subject: &Subject) -> Found {
     let mut tally = Tally::default();
-    subject.each_by_default("tangent", 5, |specimen, random| {
+    subject.each(Draw::DefaultChoices, "tangent", 5, |specimen, random| {
         let steps = specimen.paths(36, random)?.steps;
         if specimen.formulation.tangent != Tangent::Consistent {
             return Ok(0);
@@ -296,7 +297,7 @@ fn cause(routine: &Specimen, step: &Step, (row, column): (usize, usize), ratio: 
 }
 
 pub(super) fn tangent_symmetry_as_declared(subject: &Subject) -> Found {
-    let n = subject.each_by_default("symmetry", 4, |specimen, random| {
+    let n = subject.each(Draw::DefaultChoices, "symmetry", 4, |specimen, random| {
         if !specimen.formulation.symmetric {
             return Ok(0);
         }
@@ -327,7 +328,7 @@ pub(super) fn tangent_symmetry_as_declared(subject: &Subject) -> Found {
 }
 
 pub(super) fn linearity_as_declared(subject: &Subject) -> Found {
-    let n = subject.each_by_default("linearity", 3, |specimen, random| {
+    let n = subject.each(Draw::DefaultChoices, "linearity", 3, |specimen, random| {
         if !specimen.formulation.linear {
             return Ok(0);
         }

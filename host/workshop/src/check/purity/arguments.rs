@@ -1,6 +1,8 @@
 //! Does a result depend on what is asked for next to it, or on when it is?
 
 use super::{Called, compare};
+use crate::check::description::SEPARATORS;
+use crate::check::draw::Draw;
 use crate::check::margins;
 use crate::check::points::{ELASTIC, UPDATE, first_difference, increment, is_success, largest};
 use crate::check::specimen::{BOTH, name};
@@ -90,7 +92,7 @@ const TIMES: [f64; 2] = [0.125, 1e5];
 const LENGTHS: [f64; 3] = [0.0, 1e-3, 1e4];
 
 pub(super) fn independent_of_time(subject: &Subject) -> Found {
-    let n = subject.each("time", 3, |specimen, random| {
+    let n = subject.each(Draw::Any, "time", 3, |specimen, random| {
         let points = specimen.points(48, random)?;
         let parameters = specimen.law.description().parameters.iter();
         let variables = specimen.formulation.internal_variables.iter();
@@ -139,7 +141,7 @@ pub(super) fn independent_of_time(subject: &Subject) -> Found {
 
 /// Whether a unit has one of time in it.
 fn has_time(unit: &str) -> bool {
-    unit.split(['/', '·', '*', ' '])
+    unit.split(SEPARATORS)
         .filter_map(|factor| factor.split('^').next())
         .any(|name| ["s", "h", "d"].contains(&name))
 }

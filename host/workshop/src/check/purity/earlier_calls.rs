@@ -1,6 +1,7 @@
 //! Does a result depend on other instances, or on earlier calls?
 
 use super::{Called, compare};
+use crate::check::draw::Draw;
 use crate::check::points::{ELASTIC, UPDATE, first_difference};
 use crate::check::random::Random;
 use crate::check::specimen::{BOTH, Specimen, asked, name};
@@ -10,7 +11,7 @@ use law::probe::{Form, PointStart, Probe};
 use std::slice::from_ref;
 
 pub(super) fn instances_are_independent(subject: &Subject) -> Found {
-    let others = subject.specimens(3, &mut Random::new(subject.seed, "others"))?;
+    let others = subject.specimens(Draw::Any, 3, &mut Random::new(subject.seed, "others"))?;
     compare(subject, "instances", |called, points, _| {
         let specimen = called.specimen;
         for other in &others {
@@ -56,7 +57,7 @@ const PARTS: [f64; 2] = [0.5, 1e-9];
 
 pub(super) fn independent_of_earlier_calls(subject: &Subject) -> Found {
     const N: usize = 8;
-    let n = subject.each("earlier calls", 2, |specimen, random| {
+    let n = subject.each(Draw::Any, "earlier calls", 2, |specimen, random| {
         let points = specimen.points(2 * N, random)?;
         let mut n = 0;
         for (i, point) in points.iter().enumerate().take(N) {

@@ -1,28 +1,15 @@
 //! Does a law leave numbers and the process alone?
 
+use crate::check::draw::Draw;
 use crate::check::points::UPDATE;
 use crate::check::{Found, Subject, Verdict, failed, warned};
 use law::probe::process;
-use std::ffi::OsString;
 use std::hint::black_box;
-use std::path::PathBuf;
 
 /// What a law could change about numbers and the process.
-#[derive(PartialEq, Debug)]
 struct Environment {
-    rounded: [u64; 4],
-    subnormal: u64,
-    folder: Option<PathBuf>,
-    signals: Vec<usize>,
-    arithmetic: u32,
-    locale: String,
-    has_alarm: bool,
-    /// Limits, and of the status what masks signals and files, where the system tells.
-    limits: Option<String>,
-    masks: Vec<String>,
-    variables: Vec<(OsString, OsString)>,
-    process: u32,
-    had_children: bool,
+    /// What to say where it is another one, and what it is.
+    settings: Vec<(String, String)>,
     /// Where the system tells.
     threads: Option<usize>,
     files: Option<usize>,
@@ -33,26 +20,49 @@ impl Environment {
         let one = black_box(1.0_f64);
         let little = black_box(0.75 * f64::EPSILON);
         let less = black_box(0.25 * f64::EPSILON);
+        // Each direction of rounding gives another four numbers.
+        let rounded = [one + little, one + less, -one - little, -one - less].map(f64::to_bits);
+        let subnormal = black_box(f64::MIN_POSITIVE) * black_box(0.5);
+        // Limits, and of the status what masks signals and files, where the system tells.
+        let limits = std::fs::read_to_string("/proc/self/limits").unwrap_or_default();
+        let status = std::fs::read_to_string("/proc/thread-self/status").unwrap_or_default();
+        let is_mask = |line: &&str| line.starts_with("Umask:") || line.starts_with("SigBlk:");
+        let masks: Vec<&str> = status.lines().filter(is_mask).collect();
+        let process = (std::process::id(), process::has_had_children());
+        let variables: Vec<_> = std::env::vars_os().collect();
+        let (locale, folder) = (process::locale(), std::env::current_dir().ok());
+        let has_changed = |what: &str, now: String| (format!("{what} changed"), now);
+        let mut settings = vec![
+            has_changed("the working directory has", format!("{folder:?}")),
+            has_changed(
+                "the treatment of subnormal numbers has",
+                subnormal.to_bits().to_string(),
+            ),
+            has_changed("the rounding mode has", format!("{rounded:?}")),
+            has_changed(
+                "what the processor does on exceptions of arithmetic has",
+                process::arithmetic().to_string(),
+            ),
+            (format!("the locale is {locale} now"), locale),
+            ("an alarm is set".to_owned(), process::alarm().to_string()),
+            has_changed("the limits of the process have", limits),
+            has_changed("the mask of signals or of new files has", masks.join("\n")),
+            ("a process was started".to_owned(), format!("{process:?}")),
+        ];
+        let handlers = process::signal_handlers().into_iter().zip(1..);
+        settings.extend(handlers.map(|(handler, number)| {
+            has_changed(
+                &format!("the handler of signal {number} has"),
+                handler.to_string(),
+            )
+        }));
+        settings.push(has_changed(
+            "the variables of the environment have",
+            format!("{variables:?}"),
+        ));
         let entries = |folder: &str| Some(std::fs::read_dir(folder).ok()?.count());
         Self {
-            // Each direction of rounding gives another four numbers.
-            rounded: [one + little, one + less, -one - little, -one - less].map(f64::to_bits),
-            subnormal: (black_box(f64::MIN_POSITIVE) * black_box(0.5)).to_bits(),
-            folder: std::env::current_dir().ok(),
-            signals: process::signal_handlers(),
-            arithmetic: process::arithmetic(),
-            locale: process::locale(),
-            has_alarm: process::alarm(),
-            limits: std::fs::read_to_string("/proc/self/limits").ok(),
-            masks: std::fs::read_to_string("/proc/thread-self/status")
-                .unwrap_or_default()
-                .lines()
-                .filter(|line| line.starts_with("Umask:") || line.starts_with("SigBlk:"))
-                .map(str::to_owned)
-                .collect(),
-            variables: std::env::vars_os().collect(),
-            process: std::process::id(),
-            had_children: process::has_had_children(),
+            settings,
             threads: entries("/proc/self/task"),
             files: entries("/proc/self/fd"),
         }
@@ -60,45 +70,20 @@ impl Environment {
 
     /// The change.
     fn changed(&self, after: &Self) -> Option<String> {
-        let more = |before: Option<usize>, after: Option<usize>| {
+        let mut pairs = self.settings.iter().zip(&after.settings);
+        if let Some((_, (what, _))) = pairs.find(|(before, after)| before.1 != after.1) {
+            return Some(what.clone());
+        }
+        let more = |what: &str, before: Option<usize>, after: Option<usize>| {
             let more = after?.checked_sub(before?)?;
-            (more > 0).then_some(more)
+            (more > 0).then(|| format!("{what}: {more}"))
         };
-        let what = if self.folder != after.folder {
-            "the working directory has changed"
-        } else if self.subnormal != after.subnormal {
-            "the treatment of subnormal numbers has changed"
-        } else if self.rounded != after.rounded {
-            "the rounding mode has changed"
-        } else if self.arithmetic != after.arithmetic {
-            "what the processor does on exceptions of arithmetic has changed"
-        } else if self.locale != after.locale {
-            return Some(format!("the locale is {} now", after.locale));
-        } else if self.has_alarm != after.has_alarm {
-            "an alarm is set"
-        } else if self.limits != after.limits {
-            "the limits of the process have changed"
-        } else if self.masks != after.masks {
-            "the mask of signals or of new files has changed"
-        } else if self.process != after.process || self.had_children != after.had_children {
-            "a process was started"
-        } else if let Some(number) = (1..)
-            .zip(self.signals.iter().zip(&after.signals))
-            .find_map(|(number, (before, after))| (before != after).then_some(number))
-        {
-            return Some(format!("the handler of signal {number} has changed"));
-        } else if self.variables != after.variables {
-            "the variables of the environment have changed"
-        } else if let Some(n) = more(self.threads, after.threads) {
-            return Some(format!("threads are left behind: {n}"));
-        } else if let Some(n) = more(self.files, after.files) {
-            return Some(format!("open files are left behind: {n}"));
-        } else if let Some(n) = more(after.files, self.files) {
-            return Some(format!("files that it has not opened are closed: {n}"));
-        } else {
-            return None;
-        };
-        Some(what.to_owned())
+        more("threads are left behind", self.threads, after.threads)
+            .or_else(|| more("open files are left behind", self.files, after.files))
+            .or_else(|| {
+                let what = "files that it has not opened are closed";
+                more(what, after.files, self.files)
+            })
     }
 }
 
@@ -119,7 +104,7 @@ pub(super) fn environment_is_left_alone(subject: &Subject) -> Found {
 
 /// Uses all functions, with failures too.
 pub(super) fn drive(subject: &Subject) -> Result<(), Verdict> {
-    subject.each("drive", 2, |specimen, random| {
+    subject.each(Draw::Any, "drive", 2, |specimen, random| {
         specimen.paths(20, random)?;
         let mut points = specimen.points(3, random)?;
         points[0].gradient1[0] = f64::NAN;
