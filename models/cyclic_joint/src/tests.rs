@@ -347,6 +347,13 @@ fn huge_increments_end_at_the_residual_friction() {
     }
 }
 
+/// Plastic work of an increment at the tractions of its end.
+fn spent(start: &Walker<CyclicJoint>, end: &Walker<CyclicJoint>) -> f64 {
+    let slipped = end.state.plastic_slip - start.state.plastic_slip;
+    let closed = end.state.plastic_contraction - start.state.plastic_contraction;
+    end.traction[1].abs() * slipped - end.traction[0] * closed
+}
+
 /// Random joints and walks: admissible, dissipative, the same in a mirror, and the tangent agrees with
 /// differences.
 #[test]
@@ -393,9 +400,7 @@ fn stays_admissible_with_an_exact_tangent_on_random_walks() {
             );
             assert!(xi >= start.state.plastic_slip);
             assert!(walker.state.plastic_contraction >= start.state.plastic_contraction);
-            let closed = walker.state.plastic_contraction - start.state.plastic_contraction;
-            let spent = shear.abs() * (xi - start.state.plastic_slip) - normal * closed;
-            assert!(spent >= 0.0, "{spent}");
+            assert!(spent(&start, &walker) >= 0.0, "{start:?} {walker:?}");
             assert!(walker.state.gap == 0.0 || walker.traction == [0.0; 2]);
             // Eq. (6) by itself: what the springs lost is what has flowed.
             if normal < 0.0 && start.state.gap == 0.0 && shear != 0.0 {

@@ -8,7 +8,7 @@
 use abi::{Failure, InterfaceLaw, InterfacePoint, InterfaceResponse, Tangent};
 
 /// A law at one point on a path. Tractions in kPa, jumps in m; tension and opening positive.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Walker<L: InterfaceLaw> {
     /// The law.
     pub law: L,
@@ -16,14 +16,6 @@ pub struct Walker<L: InterfaceLaw> {
     pub traction: [f64; 2],
     /// Internal variables so far.
     pub state: L::State,
-}
-
-impl<L: InterfaceLaw + Copy> Copy for Walker<L> {}
-
-impl<L: InterfaceLaw + Copy> Clone for Walker<L> {
-    fn clone(&self) -> Self {
-        *self
-    }
 }
 
 impl<L: InterfaceLaw + Copy> Walker<L> {
