@@ -9,6 +9,7 @@ use law::{Opener, Operator, SearchPath, Strided};
 use std::process::Command;
 use tempfile::TempDir;
 use tests::needs::compiler;
+use tests::words::rows_of;
 
 #[test]
 fn a_library_holds_several_laws() {
@@ -164,21 +165,13 @@ fn a_class_with_too_many_internal_variables_does_not_compile() {
 #[test]
 fn too_many_of_anything_in_fortran_is_said() {
     let text = std::fs::read_to_string(repository("tests/authors/two_laws.f90")).unwrap();
-    for (statement, says) in [
-        (
-            "call add_state(257, 'x', 'x', '-', 'X.')",
-            "not within 1 and MAX_STATES",
-        ),
-        (
-            "do k = 1, 300; call add_parameter('x'//achar(97 + mod(k, 26))//achar(97 + k/26), \
-             'x', '-', 'X.'); end do",
-            "more parameters than MAX_PARAMETERS",
-        ),
-        (
-            "call add_parameter('x', 'x', '-', 'X.', choices=[('a', k=1, 40)])",
-            "more labels of x than MAX_CHOICES",
-        ),
-    ] {
+    for [statement, says] in rows_of(
+        "
+call add_state(257, 'x', 'x', '-', 'X.') | not within 1 and MAX_STATES
+do k = 1, 300; call add_parameter('x'//achar(97 + mod(k, 26))//achar(97 + k/26), 'x', '-', 'X.'); end do | more parameters than MAX_PARAMETERS
+call add_parameter('x', 'x', '-', 'X.', choices=[('a', k=1, 40)]) | more labels of x than MAX_CHOICES
+",
+    ) {
         let folder = TempDir::new().unwrap();
         let source = folder.path().join("two_laws.f90");
         let changed = text

@@ -7,6 +7,7 @@ use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
+use tests::words::rows_of;
 
 fn validator(kind: &str) -> Validator {
     let place = TempDir::new().unwrap();
@@ -92,40 +93,37 @@ fn changed(text: &str, from: &str, to: &str) -> Value {
 fn mistakes_do_not_follow_it() {
     let (case, point) = (validator("case"), validator("point"));
     assert!(case.is_valid(&value(CASE)) && point.is_valid(&value(DRIVER)));
-    for (from, to) in [
-        // Unknown keys, at every level.
-        ("title", "titel"),
-        ("[mesh]\n", "[mesh]\ncolums = 1\n"),
-        (
-            "formulation = \"solid\"",
-            "formulation = \"solid\"\nintegretion = \"full\"",
-        ),
-        ("increments = 10", "increment = 10"),
-        ("value = 100.0", "valeu = 100.0"),
-        // What is missing, and what is of another kind.
-        ("analysis = \"plane_strain\"\n", ""),
-        ("formulation = \"solid\"\n", ""),
-        ("formulation = \"solid\"", "formulation = \"solids\""),
-        ("increments = 10", "increments = \"ten\""),
-        ("fixed = [\"x\", \"y\"]", "fixed = [\"x\", \"w\"]"),
-    ] {
+    // Unknown keys, at every level; then what is missing, and what is of another kind.
+    for [from, to] in rows_of(
+        r#"
+title | titel
+[mesh]\n | [mesh]\ncolums = 1\n
+formulation = "solid" | formulation = "solid"\nintegretion = "full"
+increments = 10 | increment = 10
+value = 100.0 | valeu = 100.0
+analysis = "plane_strain"\n | \n
+formulation = "solid"\n | \n
+formulation = "solid" | formulation = "solids"
+increments = 10 | increments = "ten"
+fixed = ["x", "y"] | fixed = ["x", "w"]
+"#,
+    ) {
         assert!(
             !case.is_valid(&changed(CASE, from, to)),
             "{from:?} to {to:?}"
         );
     }
-    for (from, to) in [
-        (
-            "hypothesis = \"interface_2d\"",
-            "hypothesis = \"interface\"",
-        ),
-        ("[initial]", "[intial]"),
-        ("increments = 20", "increments = 0"),
-        ("t = { jump = 2e-3 }", "u = { jump = 2e-3 }"),
-        ("t = { jump = 2e-3 }", "t = { slip = 2e-3 }"),
-        ("t = { jump = 2e-3 }", "t = { jump = 2e-3, traction = 0 }"),
-        ("t = { jump = 2e-3 }", "t = 2e-3"),
-    ] {
+    for [from, to] in rows_of(
+        r#"
+hypothesis = "interface_2d" | hypothesis = "interface"
+[initial] | [intial]
+increments = 20 | increments = 0
+t = { jump = 2e-3 } | u = { jump = 2e-3 }
+t = { jump = 2e-3 } | t = { slip = 2e-3 }
+t = { jump = 2e-3 } | t = { jump = 2e-3, traction = 0 }
+t = { jump = 2e-3 } | t = 2e-3
+"#,
+    ) {
         assert!(
             !point.is_valid(&changed(DRIVER, from, to)),
             "{from:?} to {to:?}"

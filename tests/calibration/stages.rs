@@ -5,6 +5,7 @@ use crate::{computed, number, run, write_points};
 use std::fs;
 use std::path::PathBuf;
 use tempfile::TempDir;
+use tests::tolerance::close;
 
 /// A joint that is elastic up to its strength: stiffness from the start of the curve, friction from its end.
 fn joint(stiffness: f64, friction: f64, stress: f64) -> String {
@@ -59,10 +60,7 @@ fn stages_fit_their_own_parameters_to_their_own_tests() {
         assert_eq!(outcome.stages.len(), n);
         for (name, truth) in ["shear_stiffness", "friction_angle"].into_iter().zip(TRUTH) {
             let found = outcome.values[number(&outcome, name)];
-            assert!(
-                (found / truth - 1.0).abs() < 1e-5,
-                "{n} stages, {name}: {found}"
-            );
+            close(format_args!("{n} stages, {name}"), found / truth, 1.0, 1e-5);
         }
     }
     let outcome = run(&staged, &[]).unwrap();

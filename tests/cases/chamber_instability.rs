@@ -7,6 +7,7 @@
 //!           swap and two end alike; with k_n × 1000, exit code 2 and the limit that K_n exceeds.
 
 use crate::variant::{assert_close, finished, run};
+use tests::words::has;
 
 const CASE: &str = "chamber_instability";
 
@@ -75,14 +76,8 @@ fn where_the_traction_jumps_the_run_stops_at_the_last_equilibrium() {
     let error = run.outcome.as_ref().unwrap_err();
     assert_eq!(error.exit_code(), 2, "{error}");
     let message = error.to_string();
-    assert!(
-        message.contains("phase `interface`, increment 1"),
-        "{message}"
-    );
-    assert!(
-        message.contains("contact opens and closes there"),
-        "{message}"
-    );
+    has(&message, "phase `interface`, increment 1");
+    has(&message, "contact opens and closes there");
     assert_eq!(run.summary["status"], "no equilibrium");
     assert_eq!(run.summary["last_equilibrium"]["phase"], "confinement");
     assert_eq!(run.probe("confinement", "k_l").len(), 1);

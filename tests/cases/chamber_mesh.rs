@@ -6,6 +6,7 @@
 //!           element that relieves the toe.
 
 use crate::variant::finished;
+use tests::tolerance::close;
 
 const CASE: &str = "chamber_mesh";
 
@@ -21,10 +22,7 @@ fn meshes_1_and_2_nearly_coincide() {
         let [a, b] = [&one, &two].map(|run| run.probe("loading", probe));
         let largest = a.last().unwrap();
         for (a, b) in a.iter().zip(b) {
-            assert!(
-                (a - b).abs() < tolerance * largest,
-                "{probe}: {a} against {b}"
-            );
+            close(probe, *a, b, tolerance * largest);
         }
     }
 }

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use tests::case::column;
 use tests::tolerance::DRIVER;
+use tests::words::rows_of;
 
 fn driver(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -353,19 +354,13 @@ fn figures_of_columns_that_there_are_not_are_refused() {
     let folder = TempDir::new().unwrap();
     let file = folder.path().join("driver.toml");
     let csv = folder.path().join("test.csv");
-    for (from, to, words) in [
-        ("y = [\"mu\"]", "y = [\"nu\"]", "there is no column `nu`"),
-        (
-            "y = [\"mu\"]",
-            "y = [\"mu\"]\nphase = \"x\"",
-            "a driver has no phases",
-        ),
-        (
-            "name = \"silica_mu\"",
-            "name = \"a/b\"",
-            "cannot be a file's name",
-        ),
-    ] {
+    for [from, to, words] in rows_of(
+        r#"
+y = ["mu"] | y = ["nu"] | there is no column `nu`
+y = ["mu"] | y = ["mu"]\nphase = "x" | a driver has no phases
+name = "silica_mu" | name = "a/b" | cannot be a file's name
+"#,
+    ) {
         std::fs::write(&file, text.replace(from, to)).unwrap();
         let error = run_file_variants(&file, None, Some(&csv), |_| {}).unwrap_err();
         assert!(matches!(error, Error::Text(text::Error::Input(_))));

@@ -1,6 +1,8 @@
 //! Cases based on others: messages point into the file that holds the mistake.
 
 use crate::program::{BAD_INPUT, CASE, Place};
+use tests::words::edited;
+use tests::words::rows_of;
 
 /// Runs a case file that is based on another; the message is about `at`.
 fn refused(case: &str, base: &str, at: &str, says: &str) {
@@ -56,36 +58,18 @@ fn a_key_that_one_variant_lacks_names_the_variant() {
 
 #[test]
 fn finds_mistakes_in_the_base() {
-    let line = |text: &str| {
-        CASE.lines()
-            .position(|line| line.starts_with(text))
-            .unwrap()
-            + 1
-    };
-    for (edit, at, says) in [
-        (
-            ["rows =", "rwos ="],
-            format!("{}:1", line("rows")),
-            "did you mean `rows`?",
-        ),
-        (
-            ["to = 2.0", "to = nan"],
-            format!("{}:17", line("  { n = 1, to = 2.0")),
-            "`to`: nan",
-        ),
-        (
-            ["\"push\"", "\"push"],
-            format!("{}:13", line("name = \"push\"")),
-            "invalid basic string",
-        ),
-        (
-            ["law = \"joint\"", "law = \"jiont\""],
-            format!("{}:7", line("law = \"joint\"")),
-            "`jiont`",
-        ),
-    ] {
-        let base = CASE.replacen(edit[0], edit[1], 1);
-        refused(BASED, &base, &format!("base.toml:{at}"), says);
+    // The line that begins so, and the column.
+    for [edit, line, column, says] in rows_of(
+        r#"
+rows = => rwos = | rows | 1 | did you mean `rows`?
+to = 2.0 => to = nan | { n = 1, to = 2.0 | 17 | `to`: nan
+"push" => "push | name = "push" | 13 | invalid basic string
+law = "joint" => law = "jiont" | law = "joint" | 7 | `jiont`
+"#,
+    ) {
+        let at = CASE.lines().position(|own| own.trim().starts_with(line));
+        let place = format!("base.toml:{}:{column}", at.unwrap() + 1);
+        refused(BASED, &edited(CASE, &[edit]), &place, says);
     }
 }
 

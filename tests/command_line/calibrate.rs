@@ -5,6 +5,9 @@ mod mistakes;
 
 use crate::program::{BAD_INPUT, CASE, DONE, Outcome, Place};
 use serde_json::Value;
+use tests::words::has;
+use tests::words::rows_of;
+use tests::words::words;
 
 /// Shear stress of a joint of 5e4 kPa/m and tan φ = 0.6 at 100 kPa, with an error of a tenth.
 const POINTS: &str = "slip,tau,empty\n0.2,10.1,\n0.4,19.9,\n0.6,30.1,\n0.8,39.9,\n1.0,50.1,\n1.4,59.9,\n1.6,60.1,\n1.8,59.9,\n";
@@ -154,19 +157,8 @@ fn variants_and_settings() {
     let variants =
         format!("{FILE}\n[[variant]]\nname = \"a\"\n[[variant]]\nname = \"b\"\nconfidence = 0.5\n");
     place.write("joint.toml", variants);
-    let outcome = place.done(&[
-        "calibrate",
-        "joint.toml",
-        "--out",
-        "out",
-        "--set",
-        "starts=1",
-    ]);
-    assert!(
-        outcome.stderr.contains("start 1 of 1"),
-        "{}",
-        outcome.stderr
-    );
+    let outcome = place.done(&words("calibrate joint.toml --out out --set starts=1"));
+    has(&outcome.stderr, "start 1 of 1");
     let width = |variant: &str| {
         let text =
             std::fs::read_to_string(place.path("out").join(variant).join("calibration.json"));
@@ -227,17 +219,13 @@ measured = { file = "push.csv", x = "w", y = "tau" }
 noise = 0.1
 "#;
     place.write("push.csv", "w,tau\n0.5,1.0\n");
-    for (free, says) in [
-        ("shear_stiffness = {}", "`shear_stiffness` needs `laws`"),
-        (
-            "shear_stiffness = { laws = [\"soil\"] }",
-            "law `elastic` has no parameter `shear_stiffness`",
-        ),
-        (
-            "shear_stiffness = { laws = [\"skin\"] }",
-            "no case of a test has a law `skin`",
-        ),
-    ] {
+    for [free, says] in rows_of(
+        r#"
+shear_stiffness = {} | `shear_stiffness` needs `laws`
+shear_stiffness = { laws = ["soil"] } | law `elastic` has no parameter `shear_stiffness`
+shear_stiffness = { laws = ["skin"] } | no case of a test has a law `skin`
+"#,
+    ) {
         place.write("push.toml", file.replace("FREE", free));
         let outcome = place.run(&["calibrate", "push.toml"]);
         assert_eq!(outcome.code, Some(BAD_INPUT), "{free}");

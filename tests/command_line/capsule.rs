@@ -2,6 +2,8 @@
 
 use crate::program::{NO_EQUILIBRIUM, PLUGIN_TROUBLE, Place};
 use crate::troubled;
+use tests::words::edited;
+use tests::words::rows_of;
 
 /// A folder in which a driver has failed.
 fn failed(how: &str, arguments: &[&str], code: i32) -> Option<Place> {
@@ -138,33 +140,22 @@ fn refuses_what_is_no_capsule() {
 #[test]
 fn what_is_wrong_with_a_capsule_is_marked_in_it() {
     let good = include_str!("../fuzz/corpus/capsule/joint");
-    for (from, to, says) in [
-        (
-            "version = 1\n",
-            "version = 2\n",
-            &["1:11", "of version 2"][..],
-        ),
-        ("interface_2d", "interface_2e", &["6:14", "`interface_2d`?"]),
-        (
-            "fluxes and",
-            "fluxes und",
-            &["27:11", "there is no request"],
-        ),
-        (
-            "friction_angle",
-            "friction_angel",
-            &["22:18", "`friction_angle`?"],
-        ),
-        ("cohesion = 10.0\n", "", &["18:2", "`cohesion` is missing"]),
-        ("gap = 0.0", "cap = 0.0", &["34:", "`gap`?"]),
-        ("t = 1e-3", "s = 1e-3", &["37:23", "has no jump `s`"]),
-    ] {
-        assert!(good.contains(from), "{from:?}");
+    for [edit, at, says] in rows_of(
+        "
+version = 1\\n => version = 2\\n | 1:11 | of version 2
+interface_2d => interface_2e | 6:14 | `interface_2d`?
+fluxes and => fluxes und | 27:11 | there is no request
+friction_angle => friction_angel | 22:18 | `friction_angle`?
+cohesion = 10.0\\n => \\n | 18:2 | `cohesion` is missing
+gap = 0.0 => cap = 0.0 | 34: | `gap`?
+t = 1e-3 => s = 1e-3 | 37:23 | has no jump `s`
+",
+    ) {
         let place = Place::new();
-        place.write("failure.toml", good.replacen(from, to, 1));
+        place.write("failure.toml", edited(good, &[edit]));
         let outcome = place.refused(&["replay", "failure.toml"]);
-        for text in says {
-            assert!(outcome.says(text), "{to:?}, {text:?}: {}", outcome.stderr);
+        for text in [at, says] {
+            assert!(outcome.says(text), "{edit}, {text}: {}", outcome.stderr);
         }
     }
 }

@@ -1,17 +1,15 @@
 //! Parameters that follow from those of other laws.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
-use crate::program::{Edit, JOINT, Place, edited, refuses};
+use crate::program::{JOINT, Place, edited, refuses};
 use serde_json::Value;
+use tests::tolerance::close;
 
 /// An upright joint beside ground whose stiffness grows with the height, and what replaces values of the joint.
-fn upright(edits: &[Edit]) -> String {
-    let own: &[Edit] = &[
-        ("middle = { y = 0.5 }", "middle = { x = 1.0 }"),
-        (
-            "young_modulus = 1e4",
-            "young_modulus = { z = [[0.0, 1e4], [1.0, 3e4]] }",
-        ),
+fn upright(edits: &[&str]) -> String {
+    let own: &[&str] = &[
+        "middle = { y = 0.5 } => middle = { x = 1.0 }",
+        "young_modulus = 1e4 => young_modulus = { z = [[0.0, 1e4], [1.0, 3e4]] }",
     ];
     edited(&[JOINT, own, edits].concat())
 }
@@ -32,22 +30,10 @@ fn what_follows_from_the_ground_follows_its_changes() {
         &[
             JOINT,
             &[
-                (
-                    "normal_stiffness = 1e6",
-                    "normal_stiffness = \"= 10 * joint.shear_stiffness\"",
-                ),
-                (
-                    "shear_stiffness = 4e5",
-                    "shear_stiffness = \"= shear_modulus(soil) / 0.01\"",
-                ),
-                (
-                    "friction_angle = 30.0",
-                    "friction_angle = \"= atan(0.7 * tan(30))\"",
-                ),
-                (
-                    "cohesion = 10.0",
-                    "cohesion = \"= max(soil.poisson_ratio, 2) * 5\"",
-                ),
+                r#"normal_stiffness = 1e6 => normal_stiffness = "= 10 * joint.shear_stiffness""#,
+                r#"shear_stiffness = 4e5 => shear_stiffness = "= shear_modulus(soil) / 0.01""#,
+                r#"friction_angle = 30.0 => friction_angle = "= atan(0.7 * tan(30))""#,
+                r#"cohesion = 10.0 => cohesion = "= max(soil.poisson_ratio, 2) * 5""#,
             ],
         ]
         .concat(),
@@ -71,10 +57,7 @@ fn what_follows_from_the_ground_follows_its_changes() {
             ("cohesion", 10.0),
         ] {
             let found = value(id);
-            assert!(
-                (found / expected - 1.0).abs() < 1e-14,
-                "{id}: {found}, {expected}"
-            );
+            close(id, found / expected, 1.0, 1e-14);
         }
         let written = &joint["expressions"]["shear_stiffness"]["expression"];
         assert_eq!(written, "= shear_modulus(soil) / 0.01");
@@ -85,19 +68,13 @@ fn what_follows_from_the_ground_follows_its_changes() {
 #[test]
 fn values_over_the_height_count_at_the_element() {
     let (summary, follows) = run(
-        &upright(&[(
-            "shear_stiffness = 4e5",
-            "shear_stiffness = \"= 20 * soil.young_modulus\"",
-        )]),
+        &upright(&[r#"shear_stiffness = 4e5 => shear_stiffness = "= 20 * soil.young_modulus""#]),
         &[],
     );
     let range = &summary["laws"]["joint (interface_2d)"]["expressions"]["shear_stiffness"];
     assert_eq!(range["smallest"].as_f64(), Some(3e5));
     assert_eq!(range["largest"].as_f64(), Some(5e5));
-    let given = (
-        "shear_stiffness = 4e5",
-        "shear_stiffness = { z = [[0.0, 2e5], [1.0, 6e5]] }",
-    );
+    let given = "shear_stiffness = 4e5 => shear_stiffness = { z = [[0.0, 2e5], [1.0, 6e5]] }";
     let (_, given) = run(&upright(&[given]), &[]);
     assert_eq!(follows, given);
 }
@@ -105,10 +82,9 @@ fn values_over_the_height_count_at_the_element() {
 /// Of E(z), at the centre of each element of the joint.
 #[test]
 fn moduli_are_those_of_the_ground_beside() {
-    let text = upright(&[(
-        "shear_stiffness = 4e5",
-        "shear_stiffness = \"= oedometric_modulus(soil) * 10\"",
-    )]);
+    let text = upright(&[
+        r#"shear_stiffness = 4e5 => shear_stiffness = "= oedometric_modulus(soil) * 10""#,
+    ]);
     let (summary, _) = run(&text, &[]);
     let range = &summary["laws"]["joint (interface_2d)"]["expressions"]["shear_stiffness"];
     // M = E (1 − ν)/((1 + ν)(1 − 2ν)), ν = 0.3.

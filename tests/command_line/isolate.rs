@@ -83,7 +83,7 @@ fn results_are_the_same_as_in_the_process() {
     let place = Place::new();
     place.write(
         "case.toml",
-        edited(&[("n = 2, to = 1.0", "n = 130, to = 1.0")]),
+        edited(&["n = 2, to = 1.0 => n = 130, to = 1.0"]),
     );
     for (out, isolate) in [("here", ""), ("apart", "--isolate")] {
         let mut arguments = vec!["run", "case.toml", "--out", out];

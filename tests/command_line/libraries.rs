@@ -5,6 +5,7 @@ use crate::program::{CASE, PLUGIN_TROUBLE, Place, refuses_in};
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::path::Path;
 use std::process::Command;
+use tests::words::rows_of;
 
 #[test]
 fn says_where_it_looked_for_a_missing_law() {
@@ -120,39 +121,17 @@ fn refuses_other_libraries() {
 
 #[test]
 fn names_the_field_of_the_handshake_that_differs() {
-    for (field, value, says) in [
-        (
-            "magic",
-            "0x12345678",
-            "`pilum_magic.magic` is 0x12345678, expected 0x50494c4d",
-        ),
-        ("magic", "0x4d4c4950", "other endianness"),
-        (
-            "struct_size",
-            "32",
-            "`pilum_magic.struct_size` is 0x20, expected 0x40",
-        ),
-        (
-            "abi_major",
-            "PILUM_ABI_MAJOR + 1",
-            "`pilum_magic.abi_major` is 0x2, expected 0x1",
-        ),
-        (
-            "pointer_bytes",
-            "4",
-            "`pilum_magic.pointer_bytes` is 0x4, expected 0x8",
-        ),
-        (
-            "real_bytes",
-            "4",
-            "`pilum_magic.real_bytes` is 0x4, expected 0x8",
-        ),
-        (
-            "layout_hash",
-            "1",
-            "`pilum_magic.layout_hash` is 0x1, expected",
-        ),
-    ] {
+    for [field, value, says] in rows_of(
+        "
+magic | 0x12345678 | `pilum_magic.magic` is 0x12345678, expected 0x50494c4d
+magic | 0x4d4c4950 | other endianness
+struct_size | 32 | `pilum_magic.struct_size` is 0x20, expected 0x40
+abi_major | PILUM_ABI_MAJOR + 1 | `pilum_magic.abi_major` is 0x2, expected 0x1
+pointer_bytes | 4 | `pilum_magic.pointer_bytes` is 0x4, expected 0x8
+real_bytes | 4 | `pilum_magic.real_bytes` is 0x4, expected 0x8
+layout_hash | 1 | `pilum_magic.layout_hash` is 0x1, expected
+",
+    ) {
         let Some(place) = compiled(&handshake(&block(field, value), "")) else {
             return;
         };

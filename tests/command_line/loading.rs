@@ -2,6 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use crate::program::{Place, refuses};
+use tests::words::rows_of;
 
 #[test]
 fn refuses_impossible_phases() {
@@ -193,18 +194,12 @@ fn close(found: &[f64], expected: &[f64]) {
 fn a_load_comes_back_with_its_ground_and_is_told_of() {
     const DIG: (&str, &str) = ("dig", "deactivate = [\"upper\"]");
     const FILL: (&str, &str) = ("fill", "activate = [\"upper\"]");
-    for (kind, load, none) in [
-        (
-            "pressure",
-            "{ line = \"top\", value = 100.0 }",
-            "{ line = \"top\", value = 0.0 }",
-        ),
-        (
-            "force",
-            "{ line = \"top\", y = -100.0 }",
-            "{ line = \"top\", y = 0.0 }",
-        ),
-    ] {
+    for [kind, load, none] in rows_of(
+        r#"
+pressure | { line = "top", value = 100.0 } | { line = "top", value = 0.0 }
+force | { line = "top", y = -100.0 } | { line = "top", y = 0.0 }
+"#,
+    ) {
         let give = |load: &str| format!("{kind} = [{load}]");
         let (load, none) = (give(load), give(none));
         let press = ("press", load.as_str());
@@ -363,20 +358,13 @@ fn says_how_much_of_a_force_is_lost() {
 #[test]
 fn loads_and_displacements_on_an_interface_are_refused() {
     let there = jointed(true);
-    for (does, says) in [
-        (
-            "force = [{ line = \"middle\", x = 1.0 }]",
-            "a force on line `middle`, which carries interface elements",
-        ),
-        (
-            "pressure = [{ line = \"middle\", value = 1.0 }]",
-            "a pressure on line `middle`, which carries interface elements",
-        ),
-        (
-            "displacement = [{ line = \"middle\", x = 1e-3 }]",
-            "a displacement on line `middle`, which carries interface elements",
-        ),
-    ] {
+    for [does, says] in rows_of(
+        r#"
+force = [{ line = "middle", x = 1.0 }] | a force on line `middle`, which carries interface elements
+pressure = [{ line = "middle", value = 1.0 }] | a pressure on line `middle`, which carries interface elements
+displacement = [{ line = "middle", x = 1e-3 }] | a displacement on line `middle`, which carries interface elements
+"#,
+    ) {
         let text = with_phases(&there, &[("rest", ""), ("do", does)]);
         refused(
             &text,

@@ -2,6 +2,7 @@
 
 use crate::program::{BAD_INPUT, CASE, DONE, Outcome, Place};
 use serde_json::Value;
+use tests::words::rows_of;
 
 fn run(place: &Place, measured: &str) -> Outcome {
     let figure = "[[figure]]\nname = \"push\"\nx = \"settlement\"\ny = [\"tau\"]\n";
@@ -63,45 +64,19 @@ fn what_cannot_be_drawn_is_refused_at_its_key() {
         "blank.csv",
         "\n# a test\nw,load\n\n1,10\n\r\n\n# later\n2,ten\n",
     );
-    for (measured, at, says) in [
-        (
-            "{ file = ^\"tset.csv\", x = \"w\", y = \"load\" }",
-            "`file`: cannot read tset.csv",
-            "",
-        ),
-        (
-            "{ file = \"test.csv\", x = \"w\", y = ^\"laod\" }",
-            "`y`: test.csv has no column `laod`",
-            "did you mean `load`? There is: w, load",
-        ),
-        (
-            "{ file = \"test.csv\", x = \"w\", y = ^\"load\" }",
-            "test.csv, line 4: `ten` in column `load` is no number",
-            "",
-        ),
-        (
-            "{ file = \"blank.csv\", x = \"w\", y = ^\"load\" }",
-            "blank.csv, line 9: `ten` in column `load` is no number",
-            "",
-        ),
-        (
-            "{ file = \"comma.csv\", x = ^\"w\", y = \"load\" }",
-            "comma.csv, line 2: `1,5` in column `w` is no number",
-            "is a decimal point meant? `1.5`, not `1,5`",
-        ),
-        (
-            "{ file = ^\"empty.csv\", x = \"w\", y = \"load\" }",
-            "empty.csv has no row with `w` and `load`",
-            "",
-        ),
-        (
-            "[{ file = \"test.csv\", x = \"w\", y = \"w\", ^scale = 2 }]",
-            "unknown key `scale`",
-            "y_scale",
-        ),
-        ("^3", "`measured`: found the number 3", "or a list of them"),
-        ("^{ file = \"test.csv\", x = \"w\" }", "missing key `y`", ""),
-    ] {
+    for [measured, at, says] in rows_of(
+        r#"
+{ file = ^"tset.csv", x = "w", y = "load" } | `file`: cannot read tset.csv | tset.csv
+{ file = "test.csv", x = "w", y = ^"laod" } | `y`: test.csv has no column `laod` | did you mean `load`? There is: w, load
+{ file = "test.csv", x = "w", y = ^"load" } | test.csv, line 4: | `ten` in column `load` is no number
+{ file = "blank.csv", x = "w", y = ^"load" } | blank.csv, line 9: | `ten` in column `load` is no number
+{ file = "comma.csv", x = ^"w", y = "load" } | comma.csv, line 2: `1,5` in column `w` is no number | is a decimal point meant? `1.5`, not `1,5`
+{ file = ^"empty.csv", x = "w", y = "load" } | empty.csv has no row with | `w` and `load`
+[{ file = "test.csv", x = "w", y = "w", ^scale = 2 }] | unknown key `scale` | y_scale
+^3 | `measured`: found the number 3 | or a list of them
+^{ file = "test.csv", x = "w" } | missing key | `y`
+"#,
+    ) {
         let column = "measured = ".len() + measured.find('^').unwrap() + 1;
         let outcome = run(&place, &measured.replacen('^', "", 1));
         assert_eq!(outcome.code, Some(BAD_INPUT), "{measured}");

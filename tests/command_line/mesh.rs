@@ -1,6 +1,7 @@
 //! Grids, regions and lines that do not fit together.
 
 use crate::program::{BAD_INPUT, JOINT, Place, edited, refuses, refuses_in};
+use tests::words::rows_of;
 
 #[test]
 fn refuses_impossible_grids() {
@@ -330,19 +331,13 @@ fn a_mesh_from_a_file_is_that_of_the_grid() {
 #[test]
 fn refuses_mesh_files_that_are_wrong() {
     let place = Place::new();
-    for (old, new, says) in [
-        (
-            "8 1 0.25 0",
-            "8 1 0.25 0.1",
-            "line 21: node 8 is at z = 0.1",
-        ),
-        (
-            "5 16 2 4 2",
-            "5 36 2 4 2",
-            "line 34: an element of type 36 is a quad of higher order",
-        ),
-        ("$EndNodes", "$EndKnots", "line 27: expected `$EndNodes`"),
-    ] {
+    for [old, new, says] in rows_of(
+        "
+8 1 0.25 0 | 8 1 0.25 0.1 | line 21: node 8 is at z = 0.1
+5 16 2 4 2 | 5 36 2 4 2 | line 34: an element of type 36 is a quad of higher order
+$EndNodes | $EndKnots | line 27: expected `$EndNodes`
+",
+    ) {
         assert_eq!(blocks(0.0).matches(old).count(), 1, "{old}");
         place.write("blocks.msh", blocks(0.0).replace(old, new));
         let outcome = place.refused_case(two_blocks("mesh.file = \"blocks.msh\""));

@@ -9,6 +9,8 @@
 use crate::program::Place;
 use std::fmt::Write as _;
 use tests::case::{column, table};
+use tests::words::edited;
+use tests::words::rows_of;
 
 /// Ground 2 m wide and 3 m deep as Gmsh writes it: quads to the left of a line in the middle, triangles to
 /// the right of it.
@@ -351,23 +353,13 @@ fn a_dry_run_shows_the_model_and_computes_nothing() {
 #[test]
 fn a_dry_run_finds_what_a_run_would_refuse_and_leaves_nothing() {
     let place = place();
-    for (old, new, says) in [
-        (
-            "line = \"bottom\"",
-            "line = \"botom\"",
-            "there is no line `botom`",
-        ),
-        (
-            "friction_angle = 30.0",
-            "friction_angle = 95.0",
-            "friction_angle",
-        ),
-        (
-            "quantity = \"force_y\"",
-            "quantity = \"force_q\"",
-            "force_q",
-        ),
-    ] {
+    for [old, new, says] in rows_of(
+        r#"
+line = "bottom" | line = "botom" | there is no line `botom`
+friction_angle = 30.0 | friction_angle = 95.0 | friction_angle
+quantity = "force_y" | quantity = "force_q" | force_q
+"#,
+    ) {
         place.write("case.toml", CASE.replacen(old, new, 1));
         let outcome = place.refused(&["run", "case.toml", "--out", "none", "--dry-run"]);
         outcome.shows(says);
@@ -431,66 +423,22 @@ fn what_is_wrong_with_laws_that_nothing_takes_is_a_warning() {
     for looked in said_of_spare(&place, right) {
         assert!(looked.is_empty(), "{looked:?}");
     }
-    let joint = right.replace("elastic", "coulomb_joint");
     // What a run says, of laws that it knows anyway, and a dry run of all.
-    for (law, line, says, in_run) in [
-        (
-            right.replace("young_modulus", "young_module"),
-            29,
-            "did you mean `young_modulus`?",
-            true,
-        ),
-        (
-            right.replace("0.3", "0.7"),
-            29,
-            "0.7 is outside (-1, 0.5)",
-            true,
-        ),
-        (
-            right.replace(", poisson_ratio = 0.3", ""),
-            28,
-            "needs parameter `poisson_ratio`",
-            true,
-        ),
-        (
-            right.to_owned() + "\ninitial = { gap = 1.0 }",
-            30,
-            "has no internal variable `gap`",
-            true,
-        ),
-        (
-            joint,
-            29,
-            "`coulomb_joint` has no parameter `young_modulus`",
-            true,
-        ),
-        (
-            right.replace("1e4", "{ z = [[0, 1e4], [1, -2e4]] }"),
-            29,
-            "-20000 kPa is outside",
-            false,
-        ),
-        (
-            right.replace("elastic", "elastc"),
-            28,
-            "did you mean `elastic`?",
-            false,
-        ),
-        (
-            right
-                .replace("elastic", "mohr_coulomb")
-                .replace("0.3", "0.7"),
-            29,
-            "0.7 is outside",
-            false,
-        ),
-        (
-            right.to_owned() + "\nadapter = \"umat\"\nlibrary = \"none.so\"",
-            31,
-            "there is no file",
-            false,
-        ),
-    ] {
+    for [edit, line, says, kind] in rows_of(
+        r#"
+young_modulus => young_module | 29 | did you mean `young_modulus`? | run
+0.3 => 0.7 | 29 | 0.7 is outside (-1, 0.5) | run
+, poisson_ratio = 0.3 =>  | 28 | needs parameter `poisson_ratio` | run
+0.3 } => 0.3 }\ninitial = { gap = 1.0 } | 30 | has no internal variable `gap` | run
+elastic => coulomb_joint | 29 | `coulomb_joint` has no parameter `young_modulus` | run
+1e4 => { z = [[0, 1e4], [1, -2e4]] } | 29 | -20000 kPa is outside | dry run
+elastic => elastc | 28 | did you mean `elastic`? | dry run
+elastic"\nparameters = { young_modulus = 1e4, poisson_ratio = 0.3 => mohr_coulomb"\nparameters = { young_modulus = 1e4, poisson_ratio = 0.7 | 29 | 0.7 is outside | dry run
+0.3 } => 0.3 }\nadapter = "umat"\nlibrary = "none.so" | 31 | there is no file | dry run
+"#,
+    ) {
+        let in_run = kind == "run";
+        let law = edited(right, &[edit]);
         let [run, dry] = said_of_spare(&place, &law);
         assert_eq!(run.len(), usize::from(in_run), "{law}\n{run:?}");
         assert_eq!(dry.len(), 1, "{law}\n{dry:?}");

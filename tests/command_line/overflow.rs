@@ -31,8 +31,9 @@ fn a_probe_that_overflows_ends_the_run_with_the_rows_before() {
 #[test]
 fn factors_that_overflow_by_themselves_are_refused_before_anything_is_written() {
     let place = Place::new();
-    let product = "half = { scale = -1e300, combine = { tau = 1e10 } }";
-    let outcome = place.refused_case(edited(&[("half = { combine = { tau = 0.5 } }", product)]));
+    let product =
+        "half = { combine = { tau = 0.5 } } => half = { scale = -1e300, combine = { tau = 1e10 } }";
+    let outcome = place.refused_case(edited(&[product]));
     outcome.shows("`scale` × `tau` = -1e300 × 1e10 is too large for a number");
     assert_eq!(place.contents(), ["case.toml"]);
 }

@@ -59,8 +59,8 @@ a layer softer across than along: 4/3 · 4e5 = 5.33e5
 #[test]
 fn takes_the_hint_about_layers() {
     let text = edited(&[
-        ("normal_stiffness = 1e6", "normal_stiffness = 5.3e5"),
-        ("law = \"joint\"", "law = \"joint\"\nin_plane = \"none\""),
+        "normal_stiffness = 1e6 => normal_stiffness = 5.3e5",
+        r#"law = "joint" => law = "joint"\nin_plane = "none""#,
     ]);
     Place::new().run_case(text).ended(0);
 }

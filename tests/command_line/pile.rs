@@ -7,7 +7,9 @@ use crate::program::{BAD_INPUT, DONE, Place};
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::path::Path;
+use tests::tolerance::close;
 use tests::tolerance::near;
+use tests::words::has;
 
 /// A pile of two groups under ground water, wished in place, loaded and pulled.
 pub(crate) const PILE: &str = r#"
@@ -228,10 +230,7 @@ fn assert_resistances(place: &Place, stdout: &str, history: &[Row], area: f64) {
     let expected = a[1] + (0.08 - a[0]) / (b[0] - a[0]) * (b[1] - a[1]);
     let found = pile["resistance_10_percent_diameter"].as_f64().unwrap();
     near(found, expected, 1e-9 * expected);
-    assert!(
-        stdout.contains(&format!("{found:.1} kN, of it shaft")),
-        "{stdout}"
-    );
+    has(&stdout, format!("{found:.1} kN, of it shaft"));
     // Davisson: s = Q L/(E A) + 3.8 mm + D/120, on the straight piece of the curve that it crosses.
     let davisson = pile["resistance_davisson"].as_f64().unwrap();
     let s = (davisson - value(&history[3], "pile_head_load")) * 5.0 / (3e7 * area)
@@ -256,10 +255,7 @@ fn what_the_curve_does_not_reach_has_a_reason() {
         let reason = pile[format!("resistance_{name}_reason")].as_str().unwrap();
         assert!(reason.contains("0.002"), "{reason}");
     }
-    assert!(
-        stdout.contains("no resistance at 10 % of the diameter"),
-        "{stdout}"
-    );
+    has(&stdout, "no resistance at 10 % of the diameter");
 }
 
 #[test]
@@ -519,10 +515,7 @@ fn the_curve_of_a_test_begins_where_the_phase_before_it_ended() {
         let expected = std::iter::once(settled).chain(loads.map(|name| value(before, name)));
         for (i, expected) in expected.enumerate() {
             let found = start[i].as_f64().unwrap();
-            assert!(
-                (found - expected).abs() <= 1e-9 * expected.abs(),
-                "{start}: {expected}"
-            );
+            close(start, found, expected, 1e-9 * expected.abs());
         }
     }
 }

@@ -1,17 +1,15 @@
 //! Input that is plausible nonsense: refused where it cannot be meant, else said with its number.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
-use crate::program::{CASE, DONE, Edit, JOINT, Place, edited, refuses};
+use crate::program::{CASE, DONE, JOINT, Place, edited, refuses};
 
 const PUSH: &str = "displacement = [{ line = \"top\", x = 1e-5 }]";
-const PRESSURE: &str = "pressure = [{ line = \"top\", value = 10.0 }]";
-const LINES: &str = "corner = { x = 0.0, y = 0.5 }\n";
 
 /// The layer as strong as the soil.
-const ELASTIC: Edit = ("law = \"joint\"", "law = \"soil\"");
+const ELASTIC: &str = r#"law = "joint" => law = "soil""#;
 
 /// The warnings of the case after some edits, which must run.
-fn warnings(edits: &[Edit]) -> Vec<String> {
+fn warnings(edits: &[&str]) -> Vec<String> {
     let place = Place::new();
     let outcome = place.done_case(edited(edits));
     let summary = place.summary();
@@ -28,7 +26,7 @@ fn warnings(edits: &[Edit]) -> Vec<String> {
 
 /// One of the warnings says all of this.
 #[track_caller]
-fn warns(edits: &[Edit], says: &[&str]) {
+fn warns(edits: &[&str], says: &[&str]) {
     let warnings = warnings(edits);
     let found = |warning: &String| says.iter().all(|text| warning.contains(text));
     assert!(warnings.iter().any(found), "{says:?}\n{warnings:#?}");
@@ -36,7 +34,7 @@ fn warns(edits: &[Edit], says: &[&str]) {
 
 /// There is no warning at all.
 #[track_caller]
-fn runs_quietly(edits: &[Edit]) {
+fn runs_quietly(edits: &[&str]) {
     // Edits may leave a law without a group.
     let mut warnings = warnings(edits);
     warnings.retain(|warning| !warning.starts_with("no group takes the laws"));
@@ -54,25 +52,19 @@ the long side across
 "#,
     );
     // Elements may be shorter than the layer is thick, and a layer a little so.
-    let normal = (
-        "formulation = \"thin_layer\"",
-        "formulation = \"thin_layer\"\nnormal = \"x\"",
-    );
+    let normal = r#"formulation = "thin_layer" => formulation = "thin_layer"\nnormal = "x""#;
     runs_quietly(&[normal]);
     runs_quietly(&[
         normal,
         ELASTIC,
-        (
-            "{ n = 2, to = 1.0 }",
-            "{ n = 1, to = 0.99 }, { n = 4, to = 1.0 }",
-        ),
-        ("middle = { y = 0.5 }\ncorner = { x = 0.0, y = 0.5 }\n", ""),
+        "{ n = 2, to = 1.0 } => { n = 1, to = 0.99 }, { n = 4, to = 1.0 }",
+        "middle = { y = 0.5 }\ncorner = { x = 0.0, y = 0.5 }\n => ",
     ]);
     runs_quietly(&[
         normal,
         ELASTIC,
-        ("to = 1.01", "to = 1.9"),
-        ("x = [1.0, 1.01]", "x = [1.0, 1.9]"),
+        "to = 1.01 => to = 1.9",
+        "x = [1.0, 1.01] => x = [1.0, 1.9]",
     ]);
 }
 
@@ -89,16 +81,10 @@ held in one point
     // Two points on a line hold it.
     runs_quietly(&[
         ELASTIC,
-        ("line = \"bottom\"", "line = \"corner\""),
-        (
-            "[[phase]]",
-            "[[supports]]\nline = \"other\"\nfixed = [\"y\"]\n[[phase]]",
-        ),
-        (
-            LINES,
-            "corner = { x = 0.0, y = 0.5 }\nother = { x = 2.0, y = 0.5 }\n",
-        ),
-        ("young_modulus = 1e4", "young_modulus = 1e6"),
+        r#"line = "bottom" => line = "corner""#,
+        r#"[[phase]] => [[supports]]\nline = "other"\nfixed = ["y"]\n[[phase]]"#,
+        "corner = { x = 0.0, y = 0.5 }\n => corner = { x = 0.0, y = 0.5 }\nother = { x = 2.0, y = 0.5 }\n",
+        "young_modulus = 1e4 => young_modulus = 1e6",
     ]);
 }
 
@@ -117,26 +103,25 @@ on a line that is moved
     );
     // A pressure that acted before its line was held, one that acts once it is free, one whose
     // line only ends on a support, and one along the support.
-    runs_quietly(&[(PUSH, "displacement = [{ line = \"top\", y = -1e-3 }]")]);
+    runs_quietly(&[
+        r#"displacement = [{ line = "top", x = 1e-5 }] => displacement = [{ line = "top", y = -1e-3 }]"#,
+    ]);
     Place::new()
-        .run_case(edited(&[(
-            PUSH,
-            "displacement = [{ line = \"top\", y = -1e-3 }]\n\
-         pressure = [{ line = \"top\", value = 20.0 }]\n\
-         [[phase]]\nname = \"free\"\nincrements = 1\n\
-         free = [{ line = \"top\", components = [\"y\"] }]",
-        )]))
+        .run_case(edited(&[
+            "displacement = [{ line = \"top\", x = 1e-5 }] => displacement = [{ line = \"top\", \
+            y = -1e-3 }]\npressure = [{ line = \"top\", value = 20.0 }]\n[[phase]]\n\
+            name = \"free\"\nincrements = 1\nfree = [{ line = \"top\", components = [\"y\"] }]",
+        ]))
         .ended(DONE);
-    runs_quietly(&[(PRESSURE, "pressure = [{ line = \"left\", value = 1.0 }]")]);
+    runs_quietly(&[
+        r#"pressure = [{ line = "top", value = 10.0 }] => pressure = [{ line = "left", value = 1.0 }]"#,
+    ]);
     runs_quietly(&[
         ELASTIC,
-        ("[\"x\", \"y\"]", "[\"x\"]"),
-        ("line = \"bottom\"", "line = \"left\""),
-        (
-            "[[phase]]",
-            "[[supports]]\nline = \"bottom\"\nfixed = [\"y\"]\n[[phase]]",
-        ),
-        (PUSH, ""),
+        r#"["x", "y"] => ["x"]"#,
+        r#"line = "bottom" => line = "left""#,
+        r#"[[phase]] => [[supports]]\nline = "bottom"\nfixed = ["y"]\n[[phase]]"#,
+        r#"displacement = [{ line = "top", x = 1e-5 }] => "#,
     ]);
 }
 
@@ -146,15 +131,9 @@ fn says_how_much_of_a_pressure_is_lost() {
     warns(
         &[
             ELASTIC,
-            (
-                LINES,
-                "corner = { x = 0.0, y = 0.5 }\nhead = { y = 1.0, x = [0.0, 1.0] }\n",
-            ),
-            (
-                PRESSURE,
-                "pressure = [{ line = \"top\", value = 1.0 }]\ndisplacement = [{ line = \"head\", y = 0.0 }]",
-            ),
-            (PUSH, ""),
+            "corner = { x = 0.0, y = 0.5 }\n => corner = { x = 0.0, y = 0.5 }\nhead = { y = 1.0, x = [0.0, 1.0] }\n",
+            r#"pressure = [{ line = "top", value = 10.0 }] => pressure = [{ line = "top", value = 1.0 }]\ndisplacement = [{ line = "head", y = 0.0 }]"#,
+            r#"displacement = [{ line = "top", x = 1e-5 }] => "#,
         ],
         &["phase `weight`: 50.000 % of the pressure on line `top` (1.0000e0 kN/m)"],
     );
@@ -162,9 +141,6 @@ fn says_how_much_of_a_pressure_is_lost() {
 
 #[test]
 fn refuses_a_line_that_is_freed_and_prescribed_at_once() {
-    const HOLD: &str = "[[phase]]\nname = \"hold\"\nincrements = 1\n\
-                        displacement = [{ line = \"middle\", x = 1e-6 }]\n\n\
-                        [[phase]]\nname = \"push\"\n";
     refuses(
         r#"
 the same line
@@ -176,28 +152,21 @@ the same line
     // Freed in one direction and moved in the other; and a support that is given up to be moved.
     let place = Place::new();
     let text = edited(&[
-        ("[[phase]]\nname = \"push\"\n", HOLD),
-        (
-            PUSH,
-            "free = [{ line = \"middle\", components = [\"x\"] }]\n\
-                displacement = [{ line = \"middle\", y = -1e-6 }]",
-        ),
+        "[[phase]]\nname = \"push\"\n => [[phase]]\nname = \"hold\"\nincrements = 1\n\
+            displacement = [{ line = \"middle\", x = 1e-6 }]\n\n[[phase]]\n\
+            name = \"push\"\n",
+        r#"displacement = [{ line = "top", x = 1e-5 }] => free = [{ line = "middle", components = ["x"] }]\ndisplacement = [{ line = "middle", y = -1e-6 }]"#,
     ]);
     place.done_case(text);
-    let text = edited(&[(
-        PUSH,
-        "free = [{ line = \"bottom\", components = [\"x\"] }]\n\
-         displacement = [{ line = \"bottom\", x = 1e-6 }]",
-    )]);
+    let text = edited(&[
+        r#"displacement = [{ line = "top", x = 1e-5 }] => free = [{ line = "bottom", components = ["x"] }]\ndisplacement = [{ line = "bottom", x = 1e-6 }]"#,
+    ]);
     place.done_case(text);
 }
 
 #[test]
 fn refuses_compression_typed_as_positive_where_the_law_cannot_stand_it() {
-    const STRESS: Edit = (
-        "law = \"soil\"\n\n[groups.layer]",
-        "law = \"soil\"\ninitial_stress = ^{ 11 = 50.0, 22 = 100.0, 33 = 50.0 }\n\n[groups.layer]",
-    );
+    const STRESS: &str = r#"law = "soil"\n\n[groups.layer] => law = "soil"\ninitial_stress = ^{ 11 = 50.0, 22 = 100.0, 33 = 50.0 }\n\n[groups.layer]"#;
     refuses(
         r#"
 pressure as positive
@@ -216,47 +185,38 @@ pressure as positive
 fn says_what_a_reaction_leaves_out() {
     // 10 kPa on 2 m.
     warns(
-        &[(
-            "tau = {",
-            "head = { line = \"top\", quantity = \"reaction_y\" }\ntau = {",
-        )],
+        &[r#"tau = { => head = { line = "top", quantity = "reaction_y" }\ntau = {"#],
         &[
             "probe `head`",
             "-2.000000e1 kN/m of pressure",
             "`force_y` with a `group`",
         ],
     );
-    runs_quietly(&[(
-        "tau = {",
-        "head = { line = \"top\", quantity = \"reaction_x\" }\ntau = {",
-    )]);
-    runs_quietly(&[(
-        "tau = {",
-        "foot = { line = \"bottom\", quantity = \"reaction_y\" }\ntau = {",
-    )]);
+    runs_quietly(&[r#"tau = { => head = { line = "top", quantity = "reaction_x" }\ntau = {"#]);
+    runs_quietly(&[r#"tau = { => foot = { line = "bottom", quantity = "reaction_y" }\ntau = {"#]);
 }
 
 #[test]
 fn warns_of_stiffness_that_no_material_has() {
     warns(
-        &[("young_modulus = 1e4", "young_modulus = 210e9")],
+        &["young_modulus = 1e4 => young_modulus = 210e9"],
         &["law `soil`: its stiffness is 2.827e11 kPa", "typed in Pa"],
     );
     warns(
         &[
-            ("young_modulus = 1e4", "young_modulus = 0.5"),
-            (PRESSURE, ""),
-            (PUSH, ""),
+            "young_modulus = 1e4 => young_modulus = 0.5",
+            r#"pressure = [{ line = "top", value = 10.0 }] => "#,
+            r#"displacement = [{ line = "top", x = 1e-5 }] => "#,
         ],
         &["law `soil`: its stiffness is 6.731e-1 kPa", "typed in MPa"],
     );
     // A law that is not linear is looked at once it has been called.
     warns(
-        &[(
-            "law = \"elastic\"\nparameters = { young_modulus = 1e4, poisson_ratio = 0.3 }",
-            "law = \"mohr_coulomb\"\nparameters = { young_modulus = 210e9, poisson_ratio = 0.3, \
-             cohesion = 100.0, friction_angle = 30.0, dilatancy_angle = 0.0 }",
-        )],
+        &[
+            "law = \"elastic\"\nparameters = { young_modulus = 1e4, poisson_ratio = 0.3 } => \
+            law = \"mohr_coulomb\"\nparameters = { young_modulus = 210e9, poisson_ratio = 0.3, \
+            cohesion = 100.0, friction_angle = 30.0, dilatancy_angle = 0.0 }",
+        ],
         &["law `soil`: its stiffness is 2.827e11 kPa"],
     );
 }
@@ -265,25 +225,27 @@ fn warns_of_stiffness_that_no_material_has() {
 fn warns_of_results_beyond_small_strains() {
     // Half of the modulus as a pressure.
     warns(
-        &[("value = 10.0", "value = 5000.0"), (PUSH, "")],
+        &[
+            "value = 10.0 => value = 5000.0",
+            r#"displacement = [{ line = "top", x = 1e-5 }] => "#,
+        ],
         &[
             "beyond the theory of small strains",
             "of the bodies are strained by more than 0.2",
         ],
     );
     warns(
-        &[(PUSH, "displacement = [{ line = \"top\", x = 0.5 }]")],
+        &[
+            r#"displacement = [{ line = "top", x = 1e-5 }] => displacement = [{ line = "top", x = 0.5 }]"#,
+        ],
         &["a node moves by 0.5000 m, the model is 2.0000 m long"],
     );
     let opened = [
         JOINT,
         &[
-            (PRESSURE, ""),
-            (PUSH, "displacement = [{ line = \"above\", y = 0.9 }]"),
-            (
-                LINES,
-                "corner = { x = 0.0, y = 0.5 }\nabove = { y = 1.0 }\n",
-            ),
+            r#"pressure = [{ line = "top", value = 10.0 }] => "#,
+            r#"displacement = [{ line = "top", x = 1e-5 }] => displacement = [{ line = "above", y = 0.9 }]"#,
+            "corner = { x = 0.0, y = 0.5 }\n => corner = { x = 0.0, y = 0.5 }\nabove = { y = 1.0 }\n",
         ],
     ]
     .concat();
@@ -299,16 +261,13 @@ fn warns_of_results_beyond_small_strains() {
 #[test]
 fn warns_of_a_layer_that_is_no_layer() {
     warns(
-        &[("{ n = 1, to = 1.01 }", "{ n = 2, to = 1.01 }")],
+        &["{ n = 1, to = 1.01 } => { n = 2, to = 1.01 }"],
         &["group `layer`: the thin layer is more than one element thick: 2 elements"],
     );
     warns(
         &[
-            (
-                "{ n = 2, to = 1.0 }",
-                "{ n = 1, to = 0.99 }, { n = 4, to = 1.0 }",
-            ),
-            ("middle = { y = 0.5 }\ncorner = { x = 0.0, y = 0.5 }\n", ""),
+            "{ n = 2, to = 1.0 } => { n = 1, to = 0.99 }, { n = 4, to = 1.0 }",
+            "middle = { y = 0.5 }\ncorner = { x = 0.0, y = 0.5 }\n => ",
         ],
         &[
             "group `layer`: 1 of the thin layer's elements stand across their neighbours",
@@ -326,10 +285,9 @@ fn warns_of_a_thickness_that_differs_from_the_layers() {
         normal_stiffness = 1e6\nshear_stiffness = 4e5\ncohesion = 10.0\nfriction_angle = 30.0\n\
         dilatancy_angle = 5.0\n";
     let with = |t: &str| {
-        let text = edited(&[(
-            "formulation = \"thin_layer\"\n",
-            "formulation = \"thin_layer\"\ninitial_stress = { 11 = -100.0, 22 = -50.0, 33 = -50.0 }\n",
-        )]);
+        let text = edited(&[
+            r#"formulation = "thin_layer"\n => formulation = "thin_layer"\ninitial_stress = { 11 = -100.0, 22 = -50.0, 33 = -50.0 }\n"#,
+        ]);
         let place = Place::new();
         let outcome = place.run_case(text.replace(JOINT_LAW, &format!("{MEPI}t = {t}\n")));
         outcome.shows("phase weight");
@@ -341,18 +299,10 @@ fn warns_of_a_thickness_that_differs_from_the_layers() {
 
 #[test]
 fn warns_of_an_interface_that_ends_at_a_corner() {
-    const BLOCK: Edit = (
-        "[[mesh.region]]\ngroup = \"layer\"\nx = [1.0, 1.01]\n",
-        "[[mesh.region]]\ngroup = \"block\"\nx = [0.0, 1.0]\ny = [0.5, 1.0]\n",
-    );
-    const INTERFACE: Edit = (
-        "formulation = \"thin_layer\"\n",
-        "formulation = \"zero_thickness\"\nline = \"base\"\n",
-    );
-    const BASE: Edit = (
-        LINES,
-        "corner = { x = 0.0, y = 0.5 }\nbase = { y = 0.5, x = [0.0, 1.0] }\n",
-    );
+    const BLOCK: &str = r#"[[mesh.region]]\ngroup = "layer"\nx = [1.0, 1.01]\n => [[mesh.region]]\ngroup = "block"\nx = [0.0, 1.0]\ny = [0.5, 1.0]\n"#;
+    const INTERFACE: &str =
+        r#"formulation = "thin_layer"\n => formulation = "zero_thickness"\nline = "base"\n"#;
+    const BASE: &str = "corner = { x = 0.0, y = 0.5 }\n => corner = { x = 0.0, y = 0.5 }\nbase = { y = 0.5, x = [0.0, 1.0] }\n";
     let group = |law: &'static str| {
         let text = edited(&[BLOCK, INTERFACE, BASE]);
         text.replace(
@@ -375,18 +325,15 @@ fn warns_of_an_interface_that_ends_at_a_corner() {
 
 #[test]
 fn warns_of_an_axis_that_is_free() {
-    let about = ("\"plane_strain\"", "\"axisymmetric\"");
+    let about = r#""plane_strain" => "axisymmetric""#;
     warns(
         &[about],
         &["phase `weight`: 4 of 5 nodes on the axis r = 0 are free in r, the first at z = 0.25"],
     );
     runs_quietly(&[
         about,
-        (
-            "[[phase]]",
-            "[[supports]]\nline = \"left\"\nfixed = [\"x\"]\n\n[[phase]]",
-        ),
-        (PUSH, ""),
+        r#"[[phase]] => [[supports]]\nline = "left"\nfixed = ["x"]\n\n[[phase]]"#,
+        r#"displacement = [{ line = "top", x = 1e-5 }] => "#,
     ]);
 }
 
@@ -483,27 +430,30 @@ fn choices_of_the_solver_without_effect_are_said_with_their_line() {
     let at = text.find("[solver]").unwrap();
     let place = format!("case.toml:{}:", text[..at].matches('\n').count() + 1);
     let says = "`control = \"viscous\"` has no effect with `method = \"modified_newton\"`";
-    let viscous = "[solver]\nmethod = \"modified_newton\"\ncontrol = \"viscous\"";
-    warns(&[("[solver]", viscous)], &[&place, says]);
+    let viscous = r#"[solver] => [solver]\nmethod = "modified_newton"\ncontrol = "viscous""#;
+    warns(&[viscous], &[&place, says]);
     let says = "`tangents = \"differences\"` has no effect with `method = \"initial_stress\"`";
-    let differences = "[solver]\nmethod = \"initial_stress\"\ntangents = \"differences\"";
-    warns(&[("[solver]", differences)], &[&place, says]);
-    let newton = "[solver]\nmethod = \"newton\"\ncontrol = \"viscous\"\ntangents = \"differences\"";
-    let said = warnings(&[("[solver]", newton)]);
+    let differences =
+        r#"[solver] => [solver]\nmethod = "initial_stress"\ntangents = "differences""#;
+    warns(&[differences], &[&place, says]);
+    let newton =
+        r#"[solver] => [solver]\nmethod = "newton"\ncontrol = "viscous"\ntangents = "differences""#;
+    let said = warnings(&[newton]);
     assert!(!said.iter().any(|w| w.contains("no effect")), "{said:?}");
 }
 
 #[test]
 fn weights_that_a_phase_gives_to_ground_are_told() {
-    const GROUND: Edit = (
-        "law = \"soil\"",
-        "law = \"soil\"\nunit_weight = 18.0\ninitial_stress = { k_0 = 0.5 }",
-    );
+    const GROUND: &str =
+        r#"law = "soil" => law = "soil"\nunit_weight = 18.0\ninitial_stress = { k_0 = 0.5 }"#;
     for (given, value) in [
         ("unit_weight = { soil = 40.0 }", "40"),
         ("unit_weight = { soil = 3.0 }", "3"),
     ] {
         let told = format!("phase `push`: `unit_weight` of group `soil` is {value} kN/m³");
-        warns(&[GROUND, (PUSH, given)], &[&told, "ground has 5 to 30"]);
+        warns(
+            &[GROUND, &format!("{PUSH} => {given}")],
+            &[&told, "ground has 5 to 30"],
+        );
     }
 }

@@ -90,26 +90,14 @@ profile = "phases"
 "#;
 
 /// Edits that put the joint along the middle, without thickness, in place of the layer.
-pub(crate) const JOINT: &[Edit] = &[
-    ("[[mesh.region]]\ngroup = \"layer\"\nx = [1.0, 1.01]\n", ""),
-    (
-        "formulation = \"thin_layer\"\n",
-        "formulation = \"zero_thickness\"\nline = \"middle\"\n",
-    ),
+pub(crate) const JOINT: &[&str] = &[
+    r#"[[mesh.region]]\ngroup = "layer"\nx = [1.0, 1.01]\n => "#,
+    r#"formulation = "thin_layer"\n => formulation = "zero_thickness"\nline = "middle"\n"#,
 ];
 
-/// A text that occurs in the case, and what is there instead.
-pub(crate) type Edit = (&'static str, &'static str);
-
-/// The case after some edits.
-///
-/// # Panics
-/// If a text to be replaced does not occur.
-pub(crate) fn edited(edits: &[Edit]) -> String {
-    edits.iter().fold(CASE.to_owned(), |text, (from, to)| {
-        assert!(text.contains(from), "the case does not contain {from:?}");
-        text.replacen(from, to, 1)
-    })
+/// The case after some edits `from => to`.
+pub(crate) fn edited(edits: &[&str]) -> String {
+    tests::words::edited(CASE, edits)
 }
 
 /// A folder to run the program in.

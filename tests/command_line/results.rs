@@ -1,8 +1,8 @@
 //! Output of runs that succeed and of others.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
+use crate::program::JOINT;
 use crate::program::{BAD_INPUT, CASE, DONE, NO_EQUILIBRIUM, Place, edited};
-use crate::program::{Edit, JOINT};
 use crate::troubled;
 use std::ffi::OsStr;
 use std::path::Path;
@@ -11,21 +11,12 @@ use tests::case::table;
 /// The upper half slides on the joint: without friction 10 kPa over 2 m resist, and a pressure
 /// acts on 0.5 m, so 40 of its 100 kPa can be carried.
 pub(crate) fn sliding() -> String {
-    let slide: [Edit; 5] = [
-        ("friction_angle = 30.0", "friction_angle = 0.0"),
-        ("dilatancy_angle = 5.0", "dilatancy_angle = 0.0"),
-        (
-            "[mesh.lines]",
-            "[mesh.lines]\nside = { x = 2.0, y = [0.5, 1.0] }",
-        ),
-        (
-            "displacement = [{ line = \"top\", x = 1e-5 }]",
-            "pressure = [{ line = \"side\", value = 100.0 }]",
-        ),
-        (
-            "name = \"push\"\nincrements = 2",
-            "name = \"push\"\nincrements = 20",
-        ),
+    let slide: [&str; 5] = [
+        "friction_angle = 30.0 => friction_angle = 0.0",
+        "dilatancy_angle = 5.0 => dilatancy_angle = 0.0",
+        "[mesh.lines] => [mesh.lines]\nside = { x = 2.0, y = [0.5, 1.0] }",
+        r#"displacement = [{ line = "top", x = 1e-5 }] => pressure = [{ line = "side", value = 100.0 }]"#,
+        r#"name = "push"\nincrements = 2 => name = "push"\nincrements = 20"#,
     ];
     edited(&[JOINT, &slide].concat())
 }
@@ -73,12 +64,11 @@ fn warns_of_unusual_parameters_and_goes_on() {
 fn warns_of_a_phase_that_starts_out_of_balance() {
     // What held the middle is given up.
     let place = Place::new();
-    let outcome = place.done_case(edited(&[(
-        "[[phase]]\nname = \"push\"",
-        "[[phase]]\nname = \"hold\"\nincrements = 1\n\
-         displacement = [{ line = \"middle\", x = 1e-6 }]\n\n\
-         [[phase]]\nname = \"push\"\nfree = [{ line = \"middle\", components = [\"x\"] }]",
-    )]));
+    let outcome = place.done_case(edited(&[
+        "[[phase]]\nname = \"push\" => [[phase]]\nname = \"hold\"\nincrements = 1\n\
+            displacement = [{ line = \"middle\", x = 1e-6 }]\n\n[[phase]]\n\
+            name = \"push\"\nfree = [{ line = \"middle\", components = [\"x\"] }]",
+    ]));
     let warning = "phase `push` starts out of balance by ";
     outcome.shows(warning);
     assert_warns(&place, warning);
@@ -120,27 +110,15 @@ fn keeps_what_was_reached_when_there_is_no_equilibrium() {
 /// the files.
 #[test]
 fn the_report_of_a_run_is_that_of_its_files() {
-    let every: Edit = ("profile = \"phases\"", "profile = \"increments\"");
+    let every: &str = r#"profile = "phases" => profile = "increments""#;
     // A layer that is gone in the second phase leaves increments that are no profile of all points.
-    let two_layers: [Edit; 6] = [
+    let two_layers: [&str; 6] = [
         every,
-        (
-            "  { n = 1, to = 1.0 },\n",
-            "  { n = 1, to = 0.5 },\n  { n = 1, to = 0.51 },\n  { n = 1, to = 1.0 },\n",
-        ),
-        (
-            "[mesh.lines]",
-            "[[mesh.region]]\ngroup = \"seam\"\nx = [0.5, 0.51]\n\n[mesh.lines]",
-        ),
-        (
-            "[groups.layer]",
-            "[groups.seam]\nformulation = \"thin_layer\"\nlaw = \"joint\"\n\n[groups.layer]",
-        ),
-        (
-            "name = \"push\"\n",
-            "name = \"push, \\\"hard\\\"\"\ndeactivate = [\"seam\"]\n",
-        ),
-        ("title = \"A block", "title = \"Two layers, a block"),
+        "  { n = 1, to = 1.0 },\n =>   { n = 1, to = 0.5 },\n  { n = 1, to = 0.51 },\n  { n = 1, to = 1.0 },\n",
+        r#"[mesh.lines] => [[mesh.region]]\ngroup = "seam"\nx = [0.5, 0.51]\n\n[mesh.lines]"#,
+        r#"[groups.layer] => [groups.seam]\nformulation = "thin_layer"\nlaw = "joint"\n\n[groups.layer]"#,
+        r#"name = "push"\n => name = "push, \"hard\""\ndeactivate = ["seam"]\n"#,
+        r#"title = "A block => title = "Two layers, a block"#,
     ];
     let cases = [
         (edited(&[every]), DONE, "increments"),
@@ -150,7 +128,7 @@ fn the_report_of_a_run_is_that_of_its_files() {
             "profile.csv: 2 of 4 increments are not complete and left out",
         ),
         (
-            sliding().replace(every.0, every.1),
+            tests::words::edited(&sliding(), &[every]),
             NO_EQUILIBRIUM,
             "no equilibrium",
         ),
@@ -320,8 +298,9 @@ fn a_table_is_not_written_over_its_driver_by_another_name() {
 /// Everything a run can write, with a figure called `curve`.
 fn with_everything() -> String {
     let figure = "[[figure]]\nname = \"curve\"\nx = \"settlement\"\ny = [\"tau\"]\n";
-    let output = "profile = \"phases\"\npoints = \"phases\"\nfields = \"increments\"\n";
-    edited(&[("profile = \"phases\"\n", output)]) + figure
+    let output =
+        r#"profile = "phases"\n => profile = "phases"\npoints = "phases"\nfields = "increments"\n"#;
+    edited(&[output]) + figure
 }
 
 #[test]
@@ -503,8 +482,8 @@ fn results_do_not_depend_on_the_number_of_threads() {
 #[test]
 fn the_error_of_the_mesh_is_said_and_shown_where_it_is_asked_for() {
     let place = Place::new();
-    let more = "profile = \"phases\"\nfields = \"phases\"\nmesh_error = true";
-    let text = edited(&[("profile = \"phases\"", more)]);
+    let more = r#"profile = "phases" => profile = "phases"\nfields = "phases"\nmesh_error = true"#;
+    let text = edited(&[more]);
     let outcome = place.done_case(text);
     // The layer has none: it is no solid. Soil and layer are linear here or not; the soil is.
     let said = "error of the mesh in the strains, estimated at the end of phase `push`: ";
@@ -525,6 +504,6 @@ fn the_error_of_the_mesh_is_said_and_shown_where_it_is_asked_for() {
     assert!(of_phases[1]["groups"][1]["strains"].is_null());
     assert!(read("out/fields_00001.vtu").contains("Name=\"mesh_error\""));
 
-    let text = edited(&[("profile = \"phases\"", "mesh_error = \"yes\"")]);
+    let text = edited(&[r#"profile = "phases" => mesh_error = "yes""#]);
     place.refused_case(text).shows("mesh_error");
 }

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::{Duration, Instant};
 use tests::case::column;
+use tests::words::words;
 
 /// Increments of each of the two phases.
 const INCREMENTS: usize = 60;
@@ -20,16 +21,10 @@ fn long_case(solver: &str) -> String {
                    [[figure]]\nname = \"cut\"\nx = \"x\"\ny = [\"stress_11\"]\n\
                    points = { group = \"soil\", increments = [3, 50] }\n\n[output]";
     edited(&[
-        ("increments = 2", "increments = 60"),
-        (
-            "increments = 2\ndis",
-            "increments = 60\nlaws = { layer = \"weak\" }\ndis",
-        ),
-        ("x = 1e-5", "x = 1e-3"),
-        (
-            "profile = \"phases\"",
-            "profile = \"increments\"\npoints = \"increments\"\nfields = \"increments\"",
-        ),
+        "increments = 2 => increments = 60",
+        r#"increments = 2\ndis => increments = 60\nlaws = { layer = "weak" }\ndis"#,
+        "x = 1e-5 => x = 1e-3",
+        r#"profile = "phases" => profile = "increments"\npoints = "increments"\nfields = "increments""#,
     ])
     .replacen("[groups.soil]", swapped, 1)
     .replacen("[output]", figures, 1)
@@ -100,27 +95,23 @@ fn whole_rows(place: &Place) -> usize {
     rows.iter().filter(|row| whole(row)).count()
 }
 
+/// Results of a run that nothing stops.
+fn undisturbed(text: &str, more: &[&str]) -> BTreeMap<String, Vec<u8>> {
+    let place = Place::new();
+    place.write("block.toml", text);
+    place.done(&[&["run", "block.toml", "--out", "out"], more].concat());
+    results(&place.path("out"))
+}
+
 /// Kills the run of a case at this many different moments, resumes it, and compares. `rows`: of its
 /// history.
 fn killed_and_resumed(text: &str, rows: usize, kills: u32) {
-    let undisturbed = Place::new();
-    undisturbed.write("block.toml", text);
     let started = Instant::now();
-    undisturbed.done(&["run", "block.toml", "--out", "out", "--checkpoint", "0"]);
+    let expected = undisturbed(text, &["--checkpoint", "0"]);
     let mut length = started.elapsed().as_secs_f64();
-    let expected = results(&undisturbed.path("out"));
-
     let place = Place::new();
     place.write("block.toml", text);
-    let run = [
-        "run",
-        "block.toml",
-        "--out",
-        "out",
-        "--checkpoint",
-        "0",
-        "--resume",
-    ];
+    let run = words("run block.toml --out out --checkpoint 0 --resume");
     let mut on_the_way = 0;
     for kill in 0..kills {
         // A scatter of moments, the same every time.
@@ -166,10 +157,7 @@ fn methods_that_keep_a_matrix_resume_to_the_same_bits() {
         let text = long_case(&solver)
             .replace("max_iterations = 20", "max_iterations = 500")
             .replace("x = 1e-3", "x = 2e-5");
-        let undisturbed = Place::new();
-        undisturbed.write("block.toml", &text);
-        undisturbed.done(&["run", "block.toml", "--out", "out"]);
-        stopped_and_resumed(&text, &results(&undisturbed.path("out")), method);
+        stopped_and_resumed(&text, &undisturbed(&text, &[]), method);
     }
 }
 
@@ -188,10 +176,7 @@ fn groups_that_wait_for_a_complete_state_resume_to_the_same_bits() {
     ] {
         let solver = format!("control = \"{control}\"\nforce_tolerance = {tolerance:e}");
         let text = format!("{text}\n[solver]\n{solver}\n");
-        let undisturbed = Place::new();
-        undisturbed.write("block.toml", &text);
-        undisturbed.done(&["run", "block.toml", "--out", "out"]);
-        let expected = results(&undisturbed.path("out"));
+        let expected = undisturbed(&text, &[]);
         assert_eq!(expected.contains_key("path.csv"), control == "arc_length");
         stopped_and_resumed(&text, &expected, &solver);
     }
@@ -200,10 +185,7 @@ fn groups_that_wait_for_a_complete_state_resume_to_the_same_bits() {
 #[test]
 fn the_table_of_a_pile_goes_on_to_the_same_bits() {
     let text = crate::pile::PILE.replace("increments = 12", "increments = 600");
-    let undisturbed = Place::new();
-    undisturbed.write("block.toml", &text);
-    undisturbed.done(&["run", "block.toml", "--out", "out"]);
-    let expected = results(&undisturbed.path("out"));
+    let expected = undisturbed(&text, &[]);
     assert!(expected.contains_key("pile.csv"));
     stopped_and_resumed(&text, &expected, "pile");
 }
@@ -254,27 +236,20 @@ equations = "sparse"
 fn a_run_without_any_force_resumes_to_the_same_bits() {
     for method in ["auto", "newton"] {
         let text = format!("{FORCELESS}method = \"{method}\"\n");
-        let undisturbed = Place::new();
-        undisturbed.write("block.toml", &text);
-        undisturbed.done(&["run", "block.toml", "--out", "out"]);
-        stopped_and_resumed(&text, &results(&undisturbed.path("out")), method);
+        stopped_and_resumed(&text, &undisturbed(&text, &[]), method);
     }
 }
 
 /// One node takes a rigid line with it, and its reaction is that of the whole line.
 #[test]
 fn a_node_that_leads_a_rigid_line_goes_on_to_the_same_bits() {
-    let text = [
-        ("top = {", "pole = { x = 0.0, y = 2.0 }\ntop = {"),
-        ("increments = 1500", "increments = 1500\nrigid = [\"top\"]"),
-        ("line = \"top\", y = 0.1", "line = \"pole\", y = -0.1"),
-        ("line = \"top\", quantity", "line = \"pole\", quantity"),
-    ]
-    .iter()
-    .fold(FORCELESS.to_owned(), |text, (from, to)| {
-        assert!(text.contains(from), "{from}");
-        text.replacen(from, to, 1)
-    });
+    let edits = [
+        "top = { => pole = { x = 0.0, y = 2.0 }\\ntop = {",
+        r#"increments = 1500 => increments = 1500\nrigid = ["top"]"#,
+        r#"line = "top", y = 0.1 => line = "pole", y = -0.1"#,
+        r#"line = "top", quantity => line = "pole", quantity"#,
+    ];
+    let text = tests::words::edited(FORCELESS, &edits);
     for text in [&text, &text.replace("equations = \"sparse\"\n", "")] {
         let undisturbed = Place::new();
         undisturbed.write("block.toml", text);
@@ -394,15 +369,7 @@ fn a_full_disk_leaves_whole_rows() {
 fn a_checkpoint_of_another_case_or_a_damaged_one_is_refused() {
     let place = Place::new();
     place.write("block.toml", CASE);
-    let run = [
-        "run",
-        "block.toml",
-        "--out",
-        "out",
-        "--checkpoint",
-        "0",
-        "--resume",
-    ];
+    let run = words("run block.toml --out out --checkpoint 0 --resume");
     place.done(&run);
     place.done(&run).shows("done already");
     place.write("block.toml", CASE.replace("1e-5", "2e-5"));
@@ -419,15 +386,7 @@ fn a_checkpoint_of_another_case_or_a_damaged_one_is_refused() {
 fn files_that_were_changed_since_the_checkpoint_are_named() {
     let place = Place::new();
     place.write("block.toml", long_case(""));
-    let run = [
-        "run",
-        "block.toml",
-        "--out",
-        "out",
-        "--checkpoint",
-        "0",
-        "--resume",
-    ];
+    let run = words("run block.toml --out out --checkpoint 0 --resume");
     place.done(&run);
     for file in ["history.csv", "profile.csv", "points.csv", "log.jsonl"] {
         let path = place.path("out").join(file);

@@ -1,6 +1,7 @@
 //! `pilum table`: runs side by side as comma-separated values.
 
 use crate::program::{BAD_INPUT, CASE, Place};
+use tests::words::rows_of;
 
 fn two_runs() -> Place {
     let place = Place::new();
@@ -94,17 +95,16 @@ fn folders_without_a_run_are_refused() {
     place.write("empty/below/readme", "");
     place.write("broken/summary.json", "{\n  \"status\": don\n}");
     place.write("other/summary.json", "{}");
-    for (folder, says) in [
-        ("nowhere", "cannot read nowhere"),
-        ("empty", "cannot read empty/summary.json"),
-        (
-            "empty",
-            "there is no run in this folder, nor in those below",
-        ),
-        ("broken", "broken/summary.json:2:"),
-        ("broken", "not written by a run"),
-        ("other", "other/summary.json has no `status`"),
-    ] {
+    for [folder, says] in rows_of(
+        "
+nowhere | cannot read nowhere
+empty | cannot read empty/summary.json
+empty | there is no run in this folder, nor in those below
+broken | broken/summary.json:2:
+broken | not written by a run
+other | other/summary.json has no `status`
+",
+    ) {
         let outcome = place.run(&["table", folder]);
         assert_eq!(outcome.code, Some(BAD_INPUT), "{folder}");
         assert!(outcome.says(says), "{folder}: {says:?}\n{}", outcome.stderr);

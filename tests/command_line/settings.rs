@@ -3,6 +3,8 @@
 
 use crate::program::{BAD_INPUT, CASE, DONE, Outcome, Place};
 use serde_json::Value;
+use tests::words::rows_of;
+use tests::words::words;
 
 /// Runs the small case with settings.
 fn run(place: &Place, settings: &[&str]) -> Outcome {
@@ -80,69 +82,27 @@ fn settings_override_the_file_and_are_recorded() {
 
 #[test]
 fn what_does_not_fit_is_said_at_its_place_in_the_setting() {
-    for (setting, at, says) in [
-        (
-            "solver.max_iteration=40",
-            "1:8",
-            "did you mean `max_iterations`?",
-        ),
-        ("sovler.max_iterations=40", "1:1", "did you mean `solver`?"),
-        (
-            "solver.max_iterations=many",
-            "1:23",
-            "`max_iterations`: found the text \"many\", expected a whole number",
-        ),
-        (
-            "phase.1.pressure.1.value=true",
-            "1:26",
-            "`value`: expected a number, or values over the height",
-        ),
-        (
-            "laws.joint.parameters.friction_angle=95",
-            "1:38",
-            "`friction_angle`: 95 deg is outside [0, 90)",
-        ),
-        (
-            "laws.joint.parameters.cohesoin=1",
-            "1:23",
-            "did you mean `cohesion`?",
-        ),
-        (
-            "laws.jiont.parameters.cohesion=1",
-            "1:6",
-            "did you mean `joint`? There is: soil, joint",
-        ),
-        (
-            "phase.pusch.increments=1",
-            "1:7",
-            "did you mean `push`? There is: weight, push",
-        ),
-        ("phase.3.increments=1", "1:7", "`phase` has 2 entries"),
-        ("groups.soil.law=rock", "1:17", "there is no law `rock`"),
-        ("output.profile=often", "1:16", "there is no `often`"),
-        (
-            "title=two words",
-            "1:7",
-            "no single word, which stands for a text",
-        ),
-        (
-            "laws.joint.parameters.cohesion=1,5",
-            "1:33",
-            "is a decimal point meant? `1.5`",
-        ),
-        (
-            "solver.force_tolerance=nan",
-            "1:24",
-            "nan is no finite number",
-        ),
-        (
-            "laws.my joint.parameters.cohesion=1",
-            "1:1",
-            "--set 'laws.\"my joint\".parameters.cohesion=…'",
-        ),
-        ("base=other.toml", "1:1", "`base` cannot be set"),
-        ("solver.max_iterations", "1:1", "expected KEY=VALUE"),
-    ] {
+    for [setting, at, says] in rows_of(
+        r#"
+solver.max_iteration=40 | 1:8 | did you mean `max_iterations`?
+sovler.max_iterations=40 | 1:1 | did you mean `solver`?
+solver.max_iterations=many | 1:23 | `max_iterations`: found the text "many", expected a whole number
+phase.1.pressure.1.value=true | 1:26 | `value`: expected a number, or values over the height
+laws.joint.parameters.friction_angle=95 | 1:38 | `friction_angle`: 95 deg is outside [0, 90)
+laws.joint.parameters.cohesoin=1 | 1:23 | did you mean `cohesion`?
+laws.jiont.parameters.cohesion=1 | 1:6 | did you mean `joint`? There is: soil, joint
+phase.pusch.increments=1 | 1:7 | did you mean `push`? There is: weight, push
+phase.3.increments=1 | 1:7 | `phase` has 2 entries
+groups.soil.law=rock | 1:17 | there is no law `rock`
+output.profile=often | 1:16 | there is no `often`
+title=two words | 1:7 | no single word, which stands for a text
+laws.joint.parameters.cohesion=1,5 | 1:33 | is a decimal point meant? `1.5`
+solver.force_tolerance=nan | 1:24 | nan is no finite number
+laws.my joint.parameters.cohesion=1 | 1:1 | --set 'laws."my joint".parameters.cohesion=…'
+base=other.toml | 1:1 | `base` cannot be set
+solver.max_iterations | 1:1 | expected KEY=VALUE
+"#,
+    ) {
         refused(setting, at, says);
     }
 }
@@ -155,16 +115,7 @@ fn settings_hold_for_every_variant_and_over_bases() {
                     [[variant]]\nname = \"a\"\nlaws.joint.parameters.cohesion = 1.0\n\
                     [[variant]]\nname = \"b\"\n";
     place.write("case.toml", variants);
-    place.done(&[
-        "run",
-        "case.toml",
-        "--out",
-        "out",
-        "--set",
-        "laws.joint.parameters.cohesion=3",
-        "--set",
-        "solver.max_iterations=30",
-    ]);
+    place.done(&words("run case.toml --out out --set laws.joint.parameters.cohesion=3 --set solver.max_iterations=30"));
     for variant in ["out/a", "out/b"] {
         let summary = summary(&place, variant);
         let law = &summary["laws"]["joint (interface_2d)"];

@@ -1,10 +1,11 @@
 //! Interface laws made from laws of solids, `adapter = "shear_zone"`.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
-use crate::program::{DONE, Edit, JOINT, NO_EQUILIBRIUM, Place, edited};
+use crate::program::{DONE, JOINT, NO_EQUILIBRIUM, Place, edited};
 use crate::umat;
 use tests::case::column;
 use tests::tolerance::near;
+use tests::words::{self, rows_of};
 
 /// The joint of the case, 1 cm of the soil.
 const ZONE: &str = "adapter = \"shear_zone\"\nlaw = \"elastic\"\nthickness = 0.01\n\
@@ -132,89 +133,27 @@ fn a_failed_call_is_repeated_in_its_zone() {
 #[test]
 fn mistakes_are_said_where_they_are_made() {
     let place = Place::new();
-    let mistakes: &[(Edit, &[&str])] = &[
-        (
-            ("thickness = 0.01\n", ""),
-            &["`adapter = \"shear_zone\"` needs the `thickness` of the zone, m"],
-        ),
-        (
-            ("thickness = 0.01", "thickness = 0.0"),
-            &["`thickness`: 0 m is outside (0, ∞)"],
-        ),
-        (
-            ("thickness = 0.01", "thickness = 1e-20"),
-            &["`thickness`: 1e-20 m is below 1e-9 m", "case.toml:"],
-        ),
-        (
-            ("law = \"elastic\"\nthickness", "law = \"soul\"\nthickness"),
-            &["no library with law `soul`", "did you mean `soil`?"],
-        ),
-        (
-            (
-                "adapter = \"shear_zone\"\nlaw = \"elastic\"\nthickness = 0.01",
-                "law = \"elastic\"",
-            ),
-            &["`adapter = \"shear_zone\"` with a `thickness` makes"],
-        ),
-        (
-            ("thickness = 0.01", "thickness = 0.01\nlateral_ratio = -1.0"),
-            &["`lateral_ratio`: -1 is outside [0, ∞)"],
-        ),
-        (
-            ("adapter = \"shear_zone\"\n", ""),
-            &["`thickness` is for `adapter = \"shear_zone\"`"],
-        ),
-        (
-            (
-                "thickness = 0.01",
-                "thickness = 0.01\nlibrary = \"libx.so\"",
-            ),
-            &[
-                "`library` belongs to the law that fills the zone",
-                "law = \"NAME\"",
-            ],
-        ),
-        (
-            (
-                "law = \"elastic\"\nthickness",
-                "law = \"coulomb_joint\"\nthickness",
-            ),
-            &["a shear zone is made from a law of solids", "interface_2d"],
-        ),
-        (
-            (
-                "law = \"elastic\"\nthickness",
-                "law = \"elastik\"\nthickness",
-            ),
-            &["no library with law `elastik`"],
-        ),
-        (
-            (
-                "law = \"elastic\"\nthickness",
-                "law = \"soil\"\nsha256 = \"0000000000000000000000000000000000000000000000000000000000000000\"\nthickness",
-            ),
-            &[
-                "`sha256` belongs to the law that fills the zone",
-                "[laws.soil]",
-            ],
-        ),
-        (
-            (
-                "poisson_ratio = 0.3 }\n\n[groups.soil]",
-                "poisson_ratio = 0.7 }\n\n[groups.soil]",
-            ),
-            &["`poisson_ratio`: 0.7"],
-        ),
-    ];
-    for ((from, to), messages) in mistakes {
-        let text = joint(ZONE);
-        assert!(text.contains(from), "{from}");
-        let outcome = place.run_case(text.replacen(from, to, 1));
-        assert_ne!(outcome.code, Some(DONE), "{to}");
-        for message in *messages {
-            assert!(outcome.says(message), "{to}: {}", outcome.stderr);
+    for [edit, says, more] in rows_of(
+        r#"
+thickness = 0.01\n =>  | `adapter = "shear_zone"` needs the `thickness` of the zone, m | case.toml
+thickness = 0.01 => thickness = 0.0 | `thickness`: 0 m is outside (0, ∞) | case.toml
+thickness = 0.01 => thickness = 1e-20 | `thickness`: 1e-20 m is below 1e-9 m | case.toml:
+law = "elastic"\nthickness => law = "soul"\nthickness | no library with law `soul` | did you mean `soil`?
+adapter = "shear_zone"\nlaw = "elastic"\nthickness = 0.01 => law = "elastic" | `adapter = "shear_zone"` with a `thickness` makes | case.toml
+thickness = 0.01 => thickness = 0.01\nlateral_ratio = -1.0 | `lateral_ratio`: -1 is outside [0, ∞) | case.toml
+adapter = "shear_zone"\n =>  | `thickness` is for `adapter = "shear_zone"` | case.toml
+thickness = 0.01 => thickness = 0.01\nlibrary = "libx.so" | `library` belongs to the law that fills the zone | law = "NAME"
+law = "elastic"\nthickness => law = "coulomb_joint"\nthickness | a shear zone is made from a law of solids | interface_2d
+law = "elastic"\nthickness => law = "elastik"\nthickness | no library with law `elastik` | case.toml
+law = "elastic"\nthickness => law = "soil"\nsha256 = "0000000000000000000000000000000000000000000000000000000000000000"\nthickness | `sha256` belongs to the law that fills the zone | [laws.soil]
+poisson_ratio = 0.3 }\n\n[groups.soil] => poisson_ratio = 0.7 }\n\n[groups.soil] | `poisson_ratio`: 0.7 | case.toml
+"#,
+    ) {
+        let outcome = place.run_case(words::edited(&joint(ZONE), &[edit]));
+        assert_ne!(outcome.code, Some(DONE), "{edit}");
+        for text in [says, more, "case.toml"] {
+            assert!(outcome.says(text), "{edit}: {text}\n{}", outcome.stderr);
         }
-        assert!(outcome.says("case.toml"), "{to}: {}", outcome.stderr);
     }
 }
 

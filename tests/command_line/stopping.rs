@@ -7,6 +7,7 @@ use crate::troubled;
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
+use tests::words::has;
 
 /// What a shell says of a program that was stopped.
 const STOPPED: i32 = 130;
@@ -135,19 +136,13 @@ fn a_hopeless_increment_is_stopped_within_it() {
     let Some(place) = troubled::place("SHEAR_TANGENT=1.0e5") else {
         return;
     };
-    let solver = (
-        "max_iterations = 20",
-        "max_iterations = 10000\nmethod = \"newton\"\ntangents = \"law\"",
-    );
-    let edits = JOINT.iter().copied().chain([solver]);
-    let text = edits.fold(troubled::case("cut"), |text, (from, to)| {
-        assert!(text.contains(from), "{from}");
-        text.replacen(from, to, 1)
-    });
-    place.write(
-        "case.toml",
-        text.replacen("limit = 1.0e-6", "limit = 1.0", 1),
-    );
+    let edits = [
+        r#"max_iterations = 20 => max_iterations = 10000\nmethod = "newton"\ntangents = "law""#,
+        "limit = 1.0e-6 => limit = 1.0",
+    ];
+    let edits = [JOINT, &edits].concat();
+    let text = tests::words::edited(&troubled::case("cut"), &edits);
+    place.write("case.toml", text);
     let mut child = start(&place, &["run", "case.toml", "--out", "out"]);
     wait_for(&place, "phase weight");
     send("TERM", &child.id().to_string());
@@ -163,9 +158,9 @@ fn a_hopeless_increment_is_stopped_within_it() {
 fn studies_say_how_far_they_are_and_stop() {
     let place = Place::new();
     let accurate = edited(&[
-        ("title", "accuracy = 1e-6\ntitle"),
-        ("n = 2, to = 1.0", "n = 60, to = 1.0"),
-        ("x = 1e-5", "x = 1e-3"),
+        "title => accuracy = 1e-6\ntitle",
+        "n = 2, to = 1.0 => n = 60, to = 1.0",
+        "x = 1e-5 => x = 1e-3",
     ]);
     place.write("accurate.toml", accurate);
     place.write("case.toml", CASE);
@@ -212,11 +207,7 @@ fn a_stopped_study_has_its_rows_and_goes_on() {
     for done in ["as in the file", "the file's mesh", "increments × 0.25"] {
         assert!(settings.contains(&done), "{settings:?}");
     }
-    assert!(
-        said(&place).contains("--resume goes on from there"),
-        "{}",
-        said(&place)
-    );
+    has(&said(&place), "--resume goes on from there");
     for file in ["trade_off.svg", "trade_off.html", "trials.jsonl"] {
         assert!(place.path("out").join(file).is_file(), "{file}");
     }

@@ -10,6 +10,8 @@ use crate::results::sliding;
 use crate::troubled;
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::process::Child;
+use tests::words::has;
+use tests::words::words;
 
 /// Three by two runs.
 const STUDY: &str = r#"title = "Strength of the layer"
@@ -88,14 +90,7 @@ fn a_grid_is_carried_out_and_a_second_call_has_nothing_to_do() {
         );
     }
     // A run of the study is the run of the case with these settings.
-    let alone = [
-        "run",
-        "case.toml",
-        "--out",
-        "alone",
-        "--set",
-        "laws.joint.parameters.cohesion=5.0",
-    ];
+    let alone = words("run case.toml --out alone --set laws.joint.parameters.cohesion=5.0");
     place
         .run(&[&alone[..], &["--set", "phase.push.displacement.1.x=2e-5"]].concat())
         .ended(DONE);
@@ -128,11 +123,7 @@ fn a_grid_is_carried_out_and_a_second_call_has_nothing_to_do() {
     };
     let before = written();
     let again = study(&place, &[]).ended(DONE);
-    assert!(
-        again.stderr.contains("6 of them done already"),
-        "{}",
-        again.stderr
-    );
+    has(&again.stderr, "6 of them done already");
     let one = study(&place, &["--run", "4"]);
     one.prints("run 4: done already");
     assert_eq!(written(), before);
@@ -151,11 +142,7 @@ fn a_longer_study_keeps_the_runs_that_are_done() {
     study(&place, &[]).ended(DONE);
     place.write("study.toml", list.replace("5.0]", "5.0, 7.0]"));
     let longer = study(&place, &[]).ended(DONE);
-    assert!(
-        longer.stderr.contains("3 runs, 2 of them done already"),
-        "{}",
-        longer.stderr
-    );
+    has(&longer.stderr, "3 runs, 2 of them done already");
     // Other values, or another case, are another study.
     place.write("study.toml", list.replace("2.0,", "3.0,"));
     for more in [&[][..], &["--plan"], &["--run", "1"]] {
@@ -254,10 +241,7 @@ fn saltelli_gives_indices_with_intervals() {
     let other = self::place(&study_of("sobol"));
     study(&other, &[]).ended(DONE);
     let report = other.read("out/report.html");
-    assert!(
-        report.contains("not distinguishable from 0 (at most"),
-        "{report}"
-    );
+    has(&report, "not distinguishable from 0 (at most");
     assert!(!report.contains(">0.0 %<"));
     assert!(report.contains("digital shift, seed 0"));
     let runs = other.read("out/runs.csv");
@@ -308,10 +292,7 @@ fn of_a_run_that_fails_counts_what_it_has_passed() {
     place.write("study.toml", grid.replace("PROBE", probe));
     study(&place, &[]).ended(DONE);
     let report = place.read("out/report.html");
-    assert!(
-        report.contains("The grid has holes, 2 of 6 runs"),
-        "{report}"
-    );
+    has(&report, "The grid has holes, 2 of 6 runs");
     assert!(!report.contains("The share is η²"));
     let (_, data) = report.split_once("id=\"data\">").unwrap();
     let data: serde_json::Value =
@@ -338,11 +319,7 @@ fn an_emptied_history_is_carried_out_again() {
         std::fs::write(&history, rest).unwrap();
         assert_eq!(column(&table(&place), "status")[1], "lost");
         let again = study(&place, &[]).ended(DONE);
-        assert!(
-            again.stderr.contains("6 runs, 5 of them done already"),
-            "{}",
-            again.stderr
-        );
+        has(&again.stderr, "6 runs, 5 of them done already");
         assert_eq!(std::fs::read(&history).unwrap(), expected);
     }
 }

@@ -10,20 +10,11 @@ use tests::tolerance::near;
 fn run(define: &'static str) -> Option<Outcome> {
     let place = troubled::place(define)?;
     let text = edited(&[
-        ("title", "law_path = [\"laws\"]\ntitle"),
-        ("[[mesh.region]]\ngroup = \"layer\"\nx = [1.0, 1.01]\n", ""),
-        (
-            "[groups.soil]",
-            "[laws.troubled]\nlaw = \"troubled\"\n\n[groups.soil]",
-        ),
-        (
-            "formulation = \"thin_layer\"",
-            "formulation = \"zero_thickness\"\nline = \"middle\"",
-        ),
-        (
-            "name = \"push\"\n",
-            "name = \"push\"\nlaws = { layer = \"troubled\" }\n",
-        ),
+        r#"title => law_path = ["laws"]\ntitle"#,
+        r#"[[mesh.region]]\ngroup = "layer"\nx = [1.0, 1.01]\n => "#,
+        r#"[groups.soil] => [laws.troubled]\nlaw = "troubled"\n\n[groups.soil]"#,
+        r#"formulation = "thin_layer" => formulation = "zero_thickness"\nline = "middle""#,
+        r#"name = "push"\n => name = "push"\nlaws = { layer = "troubled" }\n"#,
     ]);
     place.write("case.toml", text);
     Some(place.run(&["run", "case.toml", "--out", "out"]))

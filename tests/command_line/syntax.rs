@@ -1,6 +1,7 @@
 //! Files that are no case: syntax, types, missing keys, encodings.
 
 use crate::program::{CASE, Place, refuses};
+use tests::words::has;
 
 #[test]
 fn refuses_what_is_not_toml() {
@@ -294,24 +295,12 @@ fn places_are_right_behind_a_byte_order_mark() {
     let outcome = place.refused_case("\u{feff}title = 3\n");
     let expected = "`title`: found the number 3, expected a text";
     assert!(outcome.stderr.contains(expected), "{}", outcome.stderr);
-    assert!(
-        outcome.stderr.contains("case.toml:1:9"),
-        "{}",
-        outcome.stderr
-    );
+    has(&outcome.stderr, "case.toml:1:9");
     // A base with a mark, and a file on top that has one too.
     place.write("base.toml", format!("\u{feff}{CASE}"));
     let outcome = place.refused_case("\u{feff}base = \"base.toml\"\nnonsense = 1\n");
-    assert!(
-        outcome.stderr.contains("unknown key `nonsense`"),
-        "{}",
-        outcome.stderr
-    );
-    assert!(
-        outcome.stderr.contains("case.toml:2:1"),
-        "{}",
-        outcome.stderr
-    );
+    has(&outcome.stderr, "unknown key `nonsense`");
+    has(&outcome.stderr, "case.toml:2:1");
 }
 
 #[test]

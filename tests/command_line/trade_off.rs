@@ -32,24 +32,15 @@ control = { t = { jump = 5.0e-3 }, n = { stiffness = 1.0e5 } }
 "#;
 
 /// Edits that make the layer of the case harden, sheared far enough, in more increments.
-pub(crate) const HARDENING: &[(&str, &str)] = &[
-    ("law = \"coulomb_joint\"", "law = \"mepi\""),
-    (
-        "normal_stiffness = 1e6\nshear_stiffness = 4e5\ncohesion = 10.0\nfriction_angle = 30.0\n\
-         dilatancy_angle = 5.0\n",
-        "k_n = 1e6\nk_t = 4e5\nn = 0.0\nmu_0 = 0.1\nmu_p = 0.7\nmu_c0 = 0.4\na = 0.008\nc_0 = 1.0\n\
-         t = 0.01\nsigma_ni = 5.0\np_0 = 5.0\n",
-    ),
-    (
-        "formulation = \"thin_layer\"\n",
-        "formulation = \"thin_layer\"\nintegration = \"mean\"\n\
-         initial_stress = { 11 = -5.0, 22 = -5.0, 33 = -5.0 }\n",
-    ),
-    (
-        "name = \"push\"\nincrements = 2",
-        "name = \"push\"\nincrements = 8",
-    ),
-    ("x = 1e-5", "x = 2e-3"),
+pub(crate) const HARDENING: &[&str] = &[
+    r#"law = "coulomb_joint" => law = "mepi""#,
+    "normal_stiffness = 1e6\nshear_stiffness = 4e5\ncohesion = 10.0\n\
+            friction_angle = 30.0\ndilatancy_angle = 5.0\n => k_n = 1e6\nk_t = 4e5\n\
+            n = 0.0\nmu_0 = 0.1\nmu_p = 0.7\nmu_c0 = 0.4\na = 0.008\nc_0 = 1.0\n\
+            t = 0.01\nsigma_ni = 5.0\np_0 = 5.0\n",
+    r#"formulation = "thin_layer"\n => formulation = "thin_layer"\nintegration = "mean"\ninitial_stress = { 11 = -5.0, 22 = -5.0, 33 = -5.0 }\n"#,
+    r#"name = "push"\nincrements = 2 => name = "push"\nincrements = 8"#,
+    "x = 1e-5 => x = 2e-3",
 ];
 
 type Row = BTreeMap<String, String>;
@@ -209,11 +200,10 @@ fn proposes_the_stiffness_of_a_joint_from_the_elements_beside_it() {
 #[test]
 fn refuses_what_it_cannot_study() {
     let place = Place::new();
-    let no_probes = edited(&[(
+    let no_probes = edited(&[
         "settlement = { line = \"top\", quantity = \"displacement_y\", scale = -1000.0 }\n\
-         tau = { group = \"layer\", quantity = \"traction_t\" }\nhalf = { combine = { tau = 0.5 } }\n",
-        "",
-    )]);
+            tau = { group = \"layer\", quantity = \"traction_t\" }\nhalf = { combine = { tau = 0.5 } }\n => ",
+    ]);
     let slip = DRIVER.replace("mu_p", "mu_q");
     let refused: &[(&str, &str, &[&str], &str)] = &[
         (

@@ -86,8 +86,8 @@ pub(crate) fn case(how: &str) -> String {
     let start = CASE.find("[laws.joint.parameters]").unwrap();
     let end = CASE.find("[groups.soil]").unwrap();
     let text = edited(&[
-        ("law = \"coulomb_joint\"", "law = \"troubled\""),
-        ("title", "law_path = [\"laws\"]\ntitle"),
+        r#"law = "coulomb_joint" => law = "troubled""#,
+        r#"title => law_path = ["laws"]\ntitle"#,
     ]);
     let parameters = &CASE[start..end];
     let own = format!("parameters = {{ limit = 1.0e-6, how = \"{how}\" }}\n\n");

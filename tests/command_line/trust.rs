@@ -5,6 +5,7 @@ use crate::program::{BAD_INPUT, CASE, DONE, PLUGIN_TROUBLE, Place};
 use crate::troubled;
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::path::{Path, PathBuf};
+use tests::words::rows_of;
 
 /// Where cargo puts the law libraries.
 fn shipped(law: &str) -> PathBuf {
@@ -110,20 +111,13 @@ fn a_driver_has_a_lock_too() {
 
 #[test]
 fn a_library_that_crashes_does_so_in_a_child() {
-    for (define, says) in [
-        (
-            "TROUBLE_AT_ENTRY",
-            "signal 11 (segmentation fault), while opening it",
-        ),
-        (
-            "TROUBLE_FROM_START=ABORT",
-            "signal 6 (aborted), while calling law `troubled` under interface_2d",
-        ),
-        (
-            "TROUBLE_FROM_START=EXIT",
-            "exit code 0, while calling law `troubled`",
-        ),
-    ] {
+    for [define, says] in rows_of(
+        "
+TROUBLE_AT_ENTRY | signal 11 (segmentation fault), while opening it
+TROUBLE_FROM_START=ABORT | signal 6 (aborted), while calling law `troubled` under interface_2d
+TROUBLE_FROM_START=EXIT | exit code 0, while calling law `troubled`
+",
+    ) {
         let Some(place) = troubled::place(define) else {
             return;
         };

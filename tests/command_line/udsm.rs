@@ -7,7 +7,9 @@ use std::path::Path;
 use std::process::Command;
 use tempfile::TempDir;
 use tests::case::{column, table};
+use tests::tolerance::close;
 use tests::tolerance::near;
+use tests::words;
 
 /// A folder with `libNAME.so`. `None`, with a remark, where there is no compiler.
 fn place(name: &str, sources: &[&str]) -> Option<Place> {
@@ -37,6 +39,10 @@ fn skew() -> Option<Place> {
     place("skew", &["udsm/skew.c"])
 }
 
+const ELASTIC: &str =
+    "law = \"elastic\"\nparameters = { young_modulus = 1e4, poisson_ratio = 0.3 }\n";
+const STRONG: &str = "cohesion = 10.0 => cohesion = 1000.0";
+const FAR: &str = "x = 1e-5 } => x = 3e-3 }";
 const MOHR_COULOMB: &str =
     "law = \"Mohr_Coulomb\"\nadapter = \"udsm\"\nlibrary = \"libsoils.so\"\n";
 const THEIRS: &str = "E = 2e4\nnu = 0.3\nc = 5.0\nphi = 35.0\npsi = 10.0\n";
@@ -92,10 +98,7 @@ fn a_mohr_coulomb_udsm_is_the_law() {
             {
                 let (a, b) = (number(ours, &column), number(theirs, &column));
                 // The driver leaves stresses within 1e-10 of what is asked for.
-                assert!(
-                    (a - b).abs() < 1e-9 * unit,
-                    "{hypothesis} {column}: {a} {b}"
-                );
+                close(format_args!("{hypothesis} {column}"), a, b, 1e-9 * unit);
             }
             let strains = [
                 ("plastic_strain", "epsilon_q"),
@@ -118,17 +121,14 @@ fn a_case_with_a_udsm_is_the_case_with_the_law() {
     };
     let with = |law: &str, parameters: &str| {
         let table = format!("{law}[laws.soil.parameters]\n{parameters}");
-        CASE.replacen(
-            "law = \"elastic\"\nparameters = { young_modulus = 1e4, poisson_ratio = 0.3 }\n",
-            &table,
-            1,
-        )
-        .replacen("cohesion = 10.0", "cohesion = 1000.0", 1)
-        .replacen("x = 1e-5 }", "x = 3e-3 }", 1)
-        .replacen(
-            "name = \"push\"\nincrements = 2",
-            "name = \"push\"\nincrements = 8",
-            1,
+        let text = words::edited(CASE, &[&format!("{ELASTIC} => {table}")]);
+        words::edited(
+            &text,
+            &[
+                STRONG,
+                FAR,
+                r#"name = "push"\nincrements = 2 => name = "push"\nincrements = 8"#,
+            ],
         )
     };
     let ends = |text: String, arguments: &[&str]| {
@@ -139,12 +139,7 @@ fn a_case_with_a_udsm_is_the_case_with_the_law() {
         ["settlement", "tau"].map(end)
     };
     let ours = ends(with("law = \"mohr_coulomb\"\n", OURS), &[]);
-    let elastic = ends(
-        CASE.replacen("x = 1e-5 }", "x = 3e-3 }", 1)
-            .replacen("cohesion = 10.0", "cohesion = 1000.0", 1)
-            .replacen("young_modulus = 1e4", "young_modulus = 2e4", 1),
-        &[],
-    );
+    let elastic = ends(words::edited(CASE, &[STRONG, FAR, "1e4 => 2e4"]), &[]);
     assert!(
         (ours[1] - elastic[1]).abs() > 1e-3 * ours[1].abs(),
         "the soil flows"
@@ -231,10 +226,7 @@ fn a_model_that_depends_on_the_time_is_given_it() {
         let outcome = place.done(&["point", "driver.toml", "--csv", "out.csv"]);
         let found = *column(&place.path("out.csv"), "stress_22").last().unwrap();
         let expected = strained - 2.0 * passed;
-        assert!(
-            (found - expected).abs() < 1e-9,
-            "{passed}: {found}, not {expected}"
-        );
+        close(passed, found, expected, 1e-9);
         let is_told = outcome.says("depends on the time");
         assert_eq!(is_told, time.is_empty(), "{}", outcome.stderr);
     }
@@ -248,27 +240,13 @@ fn an_undrained_group_says_so() {
     let law = "law = \"model_1\"\nadapter = \"udsm\"\nlibrary = \"libskew.so\"\n\
                tangent_order = \"rows\"\n\
                parameters = { young_modulus = 1e4, poisson_ratio = 0.3, skew = 0.0, wrong = 0.0 }\n";
-    let text = CASE
-        .replacen(
-            "law = \"elastic\"\nparameters = { young_modulus = 1e4, poisson_ratio = 0.3 }\n",
-            law,
-            1,
-        )
-        .replacen(
-            "integration = \"full\"\n",
-            "integration = \"full\"\ndrainage = \"undrained\"\n",
-            1,
-        )
-        .replacen(
-            "name = \"push\"\n",
-            "name = \"push\"\ndrainage = { soil = \"drained\" }\n",
-            1,
-        )
-        .replacen(
-            "[solver]",
-            "flag = { group = \"soil\", quantity = \"state_1\" }\n\n[solver]",
-            1,
-        );
+    let edits = [
+        &*format!("{ELASTIC} => {law}"),
+        r#"integration = "full"\n => integration = "full"\ndrainage = "undrained"\n"#,
+        r#"name = "push"\n => name = "push"\ndrainage = { soil = "drained" }\n"#,
+        r#"[solver] => flag = { group = "soil", quantity = "state_1" }\n\n[solver]"#,
+    ];
+    let text = words::edited(CASE, &edits);
     place.done_case(text);
     for row in table(&place.path("out/history.csv")) {
         if number(&row, "increment") > 0.0 {
@@ -283,42 +261,26 @@ fn what_a_routine_does_wrong_is_named() {
     let Some(place) = skew() else {
         return;
     };
-    for (wrong, code, message) in [
-        (
-            1.0,
-            NO_EQUILIBRIUM,
-            "the routine ends task 2 with iAbort = 7",
-        ),
-        (
-            2.0,
-            PLUGIN_TROUBLE,
-            "the routine leaves Sig with values that are not finite",
-        ),
-        (
-            3.0,
-            PLUGIN_TROUBLE,
-            "the routine writes beyond the end of Sig, which has 6 entries",
-        ),
-        (
-            4.0,
-            PLUGIN_TROUBLE,
-            "the routine overwrites Props, which is an input",
-        ),
-        (5.0, PLUGIN_TROUBLE, "the law ended its process"),
-        (
-            6.0,
-            PLUGIN_TROUBLE,
-            "the routine leaves D unwritten in task 6",
-        ),
-        (
-            7.0,
-            PLUGIN_TROUBLE,
-            "the routine returns a stress yz or zx of 1e0",
-        ),
-    ] {
-        place.write("driver.toml", skewed(ROWS, wrong, STRAINED));
+    for [wrong, code, message] in words::rows_of(
+        "
+1 | 2 | the routine ends task 2 with iAbort = 7
+2 | 3 | the routine leaves Sig with values that are not finite
+3 | 3 | the routine writes beyond the end of Sig, which has 6 entries
+4 | 3 | the routine overwrites Props, which is an input
+5 | 3 | the law ended its process
+6 | 3 | the routine leaves D unwritten in task 6
+7 | 3 | the routine returns a stress yz or zx of 1e0
+",
+    ) {
+        let driver = skewed(ROWS, wrong.parse().unwrap(), STRAINED);
+        place.write("driver.toml", driver);
         let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
-        assert_eq!(outcome.code, Some(code), "{wrong}: {}", outcome.stderr);
+        assert_eq!(
+            outcome.code,
+            code.parse().ok(),
+            "{wrong}: {}",
+            outcome.stderr
+        );
         assert!(outcome.says(message), "{wrong}: {}", outcome.stderr);
     }
     // The call is kept, and repeated.

@@ -19,13 +19,14 @@ mod tangents;
 mod time;
 mod tolerance;
 
-use crate::program::{BAD_INPUT, CASE, DONE, Edit, PLUGIN_TROUBLE, Place, edited};
+use crate::program::{BAD_INPUT, CASE, DONE, PLUGIN_TROUBLE, Place, edited};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::{Mutex, PoisonError};
 use tempfile::TempDir;
 use tests::case::table;
+use tests::words;
 
 /// A folder with a routine and its sidecar. `None`, with a remark, where there is no compiler.
 pub(crate) fn place(name: &str) -> Option<Place> {
@@ -104,6 +105,23 @@ fn soil(name: &str, keys: &str) -> String {
     let law =
         format!("law = \"umat_{name}\"\nadapter = \"umat\"\nlibrary = \"lib{name}.so\"\n{keys}");
     CASE.replacen("law = \"elastic\"", &law, 1)
+}
+
+/// The same with one more parameter.
+fn soil_with(name: &str, parameter: &str) -> String {
+    let more = format!("poisson_ratio = 0.3, {parameter} }}");
+    soil(name, "").replacen("poisson_ratio = 0.3 }", &more, 1)
+}
+
+/// The same with a cone that flows, in a layer that does not slide.
+fn flowing(name: &str) -> String {
+    let edits = [
+        "1e4, poisson_ratio = 0.3 } => 1e4, alpha = 0.3, beta = 0.05, k = 4.0 }",
+        r"cohesion = 10.0\n => cohesion = 1000.0\ntensile_strength = 1000.0\n",
+        "x = 1e-5 } => x = 3e-3 }",
+        r#"name = "push"\nincrements = 2 => name = "push"\nincrements = 10"#,
+    ];
+    words::edited(&soil(name, ""), &edits)
 }
 
 /// The bits of the last values of all probes.
@@ -192,28 +210,8 @@ fn a_soil_that_flows_converges_with_the_tangent_of_its_routine() {
     let Some(place) = place("drucker_prager") else {
         return;
     };
-    let text = soil("drucker_prager", "")
-        .replacen(
-            "parameters = { young_modulus = 1e4, poisson_ratio = 0.3 }",
-            "parameters = { young_modulus = 1e4, alpha = 0.3, beta = 0.05, k = 4.0 }",
-            1,
-        )
-        .replacen(
-            "cohesion = 10.0\n",
-            "cohesion = 1000.0\ntensile_strength = 1000.0\n",
-            1,
-        )
-        .replacen("x = 1e-5 }", "x = 3e-3 }", 1)
-        .replacen(
-            "name = \"push\"\nincrements = 2",
-            "name = \"push\"\nincrements = 10",
-            1,
-        )
-        .replacen(
-            "[solver]",
-            "flow = { group = \"soil\", quantity = \"multiplier\" }\n\n[solver]",
-            1,
-        );
+    let probe = r#"[solver] => flow = { group = "soil", quantity = "multiplier" }\n\n[solver]"#;
+    let text = words::edited(&flowing("drucker_prager"), &[probe]);
     place.done_case(text);
     let rows = table(&place.path("out/history.csv"));
     assert!(number(rows.last().unwrap(), "flow") > 1e-3);
@@ -308,11 +306,7 @@ fn a_routine_that_asks_for_smaller_steps_gets_them() {
     assert!((number(end, "stress_11") - stress).abs() < 1e-10 * stress.abs());
 
     // In a run the message names the point.
-    let case = soil("smaller", "").replacen(
-        "poisson_ratio = 0.3 }",
-        "poisson_ratio = 0.3, largest = 1e-9 }",
-        1,
-    );
+    let case = soil_with("smaller", "largest = 1e-9");
     let outcome = place.run_case(case);
     outcome.shows("group `soil`, element").shows("PNEWDT = 0.5");
 }
@@ -329,21 +323,14 @@ fn has_variables_of_its_own(name: &str) {
     let Some(place) = place(name) else {
         return;
     };
-    let edits: &[Edit] = &[
-        (
-            "[groups.soil]",
-            "[laws.hard]\nlaw = \"umat_saves\"\nadapter = \"umat\"\nlibrary = \"libsaves.so\"\nKEYS\n\
-             parameters = { young_modulus = 3e4, poisson_ratio = 0.3 }\n\n[groups.soil]",
-        ),
-        (
-            "[groups.layer]\nformulation = \"thin_layer\"\nlaw = \"joint\"",
-            "[groups.layer]\nformulation = \"solid\"\nintegration = \"full\"\nlaw = \"hard\"",
-        ),
-        (
-            "tau = { group = \"layer\", quantity = \"traction_t\" }",
-            "tau = { group = \"soil\", quantity = \"modulus\" }\nhard = { group = \"layer\", quantity = \"modulus\" }",
-        ),
-        ("profile = \"phases\"", "profile = \"never\""),
+    let edits: &[&str] = &[
+        "[groups.soil] => [laws.hard]\nlaw = \"umat_saves\"\nadapter = \"umat\"\n\
+            library = \"libsaves.so\"\nKEYS\nparameters = { young_modulus = 3e4, \
+            poisson_ratio = 0.3 }\n\n[groups.soil]",
+        r#"[groups.layer]\nformulation = "thin_layer"\nlaw = "joint" => [groups.layer]\nformulation = "solid"\nintegration = "full"\nlaw = "hard""#,
+        "tau = { group = \"layer\", quantity = \"traction_t\" } => tau = { group = \"soil\", \
+            quantity = \"modulus\" }\nhard = { group = \"layer\", quantity = \"modulus\" }",
+        r#"profile = "phases" => profile = "never""#,
     ];
     let text = edited(edits).replacen(
         "law = \"elastic\"",
@@ -416,12 +403,13 @@ fn an_interface_with_two_components() {
     let Some(place) = place("joint") else {
         return;
     };
-    let case = edited(&[(
+    let case = edited(&[
         "law = \"coulomb_joint\"\n[laws.joint.parameters]\nnormal_stiffness = 1e6\n\
-         shear_stiffness = 4e5\ncohesion = 10.0\nfriction_angle = 30.0\ndilatancy_angle = 5.0",
-        "law = \"umat_joint\"\nadapter = \"umat\"\nlibrary = \"libjoint.so\"\n\
-         [laws.joint.parameters]\nnormal_stiffness = 1e6\nshear_stiffness = 4e5\nfriction = 0.5",
-    )]);
+            shear_stiffness = 4e5\ncohesion = 10.0\nfriction_angle = 30.0\n\
+            dilatancy_angle = 5.0 => law = \"umat_joint\"\nadapter = \"umat\"\n\
+            library = \"libjoint.so\"\n[laws.joint.parameters]\nnormal_stiffness = 1e6\n\
+            shear_stiffness = 4e5\nfriction = 0.5",
+    ]);
     place.done_case(case);
 
     let driver = "law = \"umat_joint\"\nadapter = \"umat\"\nlibrary = \"libjoint.so\"\n\

@@ -1,10 +1,10 @@
 //! Phases that end where a quantity reaches a value.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
-use crate::program::{Edit, Outcome, Place, edited, refuses};
+use crate::program::{Outcome, Place, edited, refuses};
 
 /// Settlement of the block under the whole pressure, in the unit of its probe: it is linear but for the joint.
-fn run(edits: &[Edit]) -> (Outcome, Vec<Vec<String>>) {
+fn run(edits: &[&str]) -> (Outcome, Vec<Vec<String>>) {
     let place = Place::new();
     place.write("case.toml", edited(edits));
     let outcome = place.done(&["run", "case.toml", "--out", "out"]);
@@ -14,10 +14,8 @@ fn run(edits: &[Edit]) -> (Outcome, Vec<Vec<String>>) {
     (outcome, rows.collect())
 }
 
-const PROBES: Edit = (
-    "[probes]\n",
-    "[probes]\nbelow = { line = \"bottom\", quantity = \"reaction_y\" }\n",
-);
+const PROBES: &str =
+    r#"[probes]\n => [probes]\nbelow = { line = "bottom", quantity = "reaction_y" }\n"#;
 
 fn of_phase(rows: &[Vec<String>], phase: &str) -> Vec<[f64; 3]> {
     let own = rows.iter().filter(|row| row[0] == phase);
@@ -32,15 +30,9 @@ fn a_phase_ends_where_its_quantity_reaches_the_value() {
     let full = of_phase(&whole, "weight")[1];
     let target = 0.3 * full[2];
     let until = format!(
-        "pressure = [{{ line = \"top\", value = 10.0 }}]\nuntil = {{ quantity = \"settlement\", reaches = {target} }}"
+        "value = 10.0 }}] => value = 10.0 }}]\nuntil = {{ quantity = \"settlement\", reaches = {target} }}"
     );
-    let (outcome, rows) = run(&[
-        PROBES,
-        (
-            "pressure = [{ line = \"top\", value = 10.0 }]",
-            until.leak(),
-        ),
-    ]);
+    let (outcome, rows) = run(&[PROBES, &until]);
     outcome.shows("`settlement` has reached");
     let ended = of_phase(&rows, "weight");
     let [time, below, settlement] = *ended.last().unwrap();
@@ -61,10 +53,7 @@ fn a_phase_ends_where_its_quantity_reaches_the_value() {
 fn what_is_reached_already_takes_no_increment() {
     let (outcome, rows) = run(&[
         PROBES,
-        (
-            "displacement = [{ line = \"top\", x = 1e-5 }]",
-            "pressure = [{ line = \"top\", value = 20.0 }]\nuntil = { quantity = \"settlement\", reaches = 0.01 }",
-        ),
+        r#"displacement = [{ line = "top", x = 1e-5 }] => pressure = [{ line = "top", value = 20.0 }]\nuntil = { quantity = "settlement", reaches = 0.01 }"#,
     ]);
     assert_eq!(
         of_phase(&rows, "push"),
@@ -80,15 +69,12 @@ fn what_is_reached_already_takes_no_increment() {
 /// Half of the excess pressure is left where the phase that drains ends; it stays, and the ground settles no more.
 #[test]
 fn excess_pressure_that_is_left_stays() {
-    let excess: Edit = (
-        "[probes]\n",
-        "[probes]\nexcess = { group = \"soil\", quantity = \"excess_pore_pressure\" }\n",
-    );
-    let drain = |until: &'static str| {
+    let excess = r#"[probes]\n => [probes]\nexcess = { group = "soil", quantity = "excess_pore_pressure" }\n"#;
+    let drain = |until: &str| {
         let (_, rows) = run(&[
             excess,
-            ("law = \"soil\"", "law = \"soil\"\ndrainage = \"undrained\""),
-            ("displacement = [{ line = \"top\", x = 1e-5 }]", until),
+            r#"law = "soil" => law = "soil"\ndrainage = "undrained""#,
+            &format!("displacement = [{{ line = \"top\", x = 1e-5 }}] => {until}"),
         ]);
         let [weight, push, after] = ["weight", "push", "after"].map(|name| of_phase(&rows, name));
         [weight[1], push[push.len() - 1], after[after.len() - 1]]
@@ -109,10 +95,7 @@ fn excess_pressure_that_is_left_stays() {
 fn what_is_not_reached_is_said() {
     let (outcome, rows) = run(&[
         PROBES,
-        (
-            "displacement = [{ line = \"top\", x = 1e-5 }]",
-            "displacement = [{ line = \"top\", x = 1e-5 }]\nuntil = { quantity = \"settlement\", reaches = 1e3 }",
-        ),
+        r#"x = 1e-5 }] => x = 1e-5 }]\nuntil = { quantity = "settlement", reaches = 1e3 }"#,
     ]);
     assert_eq!(of_phase(&rows, "push").len(), 2);
     outcome.shows("`settlement` has not reached 1000");

@@ -5,6 +5,8 @@ use crate::program::{
     check, compiled, compiled_with, folder, library_of, pilum, pilum_in, refused,
 };
 use std::path::Path;
+use tests::words::has;
+use tests::words::rows_of;
 
 /// A tangent that is wrong where nobody usually is.
 const SOFT: &str = "#define TANGENT(row, column) ((batch->request & PILUM_REQ_TANGENT && \
@@ -154,38 +156,15 @@ fn replayed(fixture: &str, id: &str) -> Option<(String, String)> {
 /// crashes in, of the function that it crashes in.
 #[test]
 fn a_call_that_crashes_can_be_repeated() {
-    for (fixture, id, request, says) in [
-        (
-            "bad_abort",
-            "integrate-works",
-            "fluxes",
-            "the law crashed: signal 6 (aborted)",
-        ),
-        (
-            "bad_exit",
-            "integrate-works",
-            "fluxes",
-            "the law ended its process: exit code 0",
-        ),
-        (
-            "bad_create_abort",
-            "create-works",
-            "an instance",
-            "the law crashed: signal 6 (aborted)",
-        ),
-        (
-            "bad_overread",
-            "reads-stay-inside",
-            "fluxes",
-            "the law crashed: signal 11 (segmentation fault)",
-        ),
-        (
-            "bad_long_array",
-            "independent-of-split",
-            "fluxes",
-            "the law crashed: signal 11 (segmentation fault)",
-        ),
-    ] {
+    for [fixture, id, request, says] in rows_of(
+        "
+bad_abort | integrate-works | fluxes | the law crashed: signal 6 (aborted)
+bad_exit | integrate-works | fluxes | the law ended its process: exit code 0
+bad_create_abort | create-works | an instance | the law crashed: signal 6 (aborted)
+bad_overread | reads-stay-inside | fluxes | the law crashed: signal 11 (segmentation fault)
+bad_long_array | independent-of-split | fluxes | the law crashed: signal 11 (segmentation fault)
+",
+    ) {
         let Some((capsule, said)) = replayed(fixture, id) else {
             return;
         };
@@ -301,18 +280,12 @@ fn a_crash_where_no_law_is_called_can_be_repeated() {
 #[test]
 fn a_routine_that_crashes_on_opening_or_at_the_end_can_be_repeated() {
     let umat = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/umat");
-    for (attribute, key, says) in [
-        (
-            "constructor",
-            "function = \"create\"",
-            "the law crashed: signal 6",
-        ),
-        (
-            "destructor",
-            "phase = \"exit\"",
-            "the library crashed: signal 6",
-        ),
-    ] {
+    for [attribute, key, says] in rows_of(
+        r#"
+constructor | function = "create" | the law crashed: signal 6
+destructor | phase = "exit" | the library crashed: signal 6
+"#,
+    ) {
         let folder = folder();
         let source = folder.path().join("rows.c");
         let text = std::fs::read_to_string(umat.join("rows.c")).unwrap();
@@ -366,15 +339,13 @@ fn a_capsule_of_a_library_is_read_with_care() {
 /// A defect of `init_state` shows again in a replay.
 #[test]
 fn a_wrong_initial_state_can_be_repeated() {
-    for (fixture, id, says) in [
-        (
-            "bad_init_last",
-            "initial-states-are-written",
-            "`travel` is not written",
-        ),
-        ("bad_init_random", "repeatable", "; called again: flux"),
-        ("bad_init_split", "independent-of-split", "; alone: flux"),
-    ] {
+    for [fixture, id, says] in rows_of(
+        "
+bad_init_last | initial-states-are-written | `travel` is not written
+bad_init_random | repeatable | ; called again: flux
+bad_init_split | independent-of-split | ; alone: flux
+",
+    ) {
         let Some((capsule, said)) = replayed(fixture, id) else {
             return;
         };
@@ -443,10 +414,7 @@ fn a_sidecar_that_cannot_be_read_is_told_with_its_line() {
     let id = "sidecar-is-read";
     let report = check(&library, &["--only", id]);
     let details = report.check(id)["details"].as_str().unwrap();
-    assert!(
-        details.contains(&format!("law.toml:{line}: unknown key `state`; ")),
-        "{details}"
-    );
+    has(&details, format!("law.toml:{line}: unknown key `state`; "));
     let silent = format!("{good}\n[[internal]]\nid = \"slip\"\nunit = \"-\"\ndoc = \"\"\n");
     std::fs::write(&sidecar, silent).unwrap();
     let id = "description-is-complete";
@@ -489,10 +457,7 @@ fn a_law_that_gave_up_in_an_earlier_call_fails() {
     let report = check(&library, &["--only", id]);
     assert_eq!(report.with(&["failed"]), [id], "{:#}", report.json);
     let details = report.check(id)["details"].as_str().unwrap();
-    assert!(
-        details.contains("`init_state` gave PILUM_E_INTERNAL"),
-        "{details}"
-    );
+    has(&details, "`init_state` gave PILUM_E_INTERNAL");
 }
 
 /// The report on a law that panicked has its message at that time, and not only that it is not called again.

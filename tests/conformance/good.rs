@@ -3,6 +3,8 @@
 
 use crate::program::{check, compiled, folder, library_of, pilum, refused};
 use std::path::Path;
+use tests::words::rows_of;
+use tests::words::words;
 
 /// No check fails; those that say nothing of this law are skipped for its own reason.
 pub(crate) fn passes(library: &Path) {
@@ -22,23 +24,12 @@ pub(crate) fn passes(library: &Path) {
 }
 
 #[test]
-fn coulomb_joint_passes() {
-    passes(&library_of("coulomb_joint"));
-}
-
-#[test]
-fn critical_state_joint_passes() {
-    passes(&library_of("critical_state_joint"));
-}
-
-#[test]
-fn cyclic_joint_passes() {
-    passes(&library_of("cyclic_joint"));
-}
-
-#[test]
-fn elastic_passes() {
-    passes(&library_of("elastic"));
+fn laws_of_this_repository_pass() {
+    let joints =
+        words("coulomb_joint critical_state_joint cyclic_joint hyperbolic_joint mepi tz_curve");
+    for law in [joints, words("elastic mohr_coulomb oriented_mohr_coulomb")].concat() {
+        passes(&library_of(law));
+    }
 }
 
 /// What two surfaces make difficult, of both laws; a whole check takes too long.
@@ -60,31 +51,6 @@ fn hardening_soil_passes_where_surfaces_matter() {
         "{:#}",
         report.json
     );
-}
-
-#[test]
-fn hyperbolic_joint_passes() {
-    passes(&library_of("hyperbolic_joint"));
-}
-
-#[test]
-fn mepi_passes() {
-    passes(&library_of("mepi"));
-}
-
-#[test]
-fn mohr_coulomb_passes() {
-    passes(&library_of("mohr_coulomb"));
-}
-
-#[test]
-fn oriented_mohr_coulomb_passes() {
-    passes(&library_of("oriented_mohr_coulomb"));
-}
-
-#[test]
-fn tz_curve_passes() {
-    passes(&library_of("tz_curve"));
 }
 
 /// Laws that creep, relax, keep rates, count, or take substeps by a tolerance look faulty but are not.
@@ -156,93 +122,36 @@ fn ids_are_stable() {
         .collect();
     assert_eq!(
         ids,
-        [
-            "file-is-a-library",
-            "library-opens",
-            "handshake-is-accepted",
-            "entry-is-idempotent",
-            "exports-are-hidden",
-            "manifest-matches",
-            "description-is-readable",
-            "description-is-complete",
-            "units-are-known",
-            "ranges-are-plausible",
-            "create-works",
-            "wrong-arguments-are-refused",
-            "bounds-are-kept",
-            "initial-states-are-written",
-            "integrate-works",
-            "unknown-requests-are-refused",
-            "missing-tangent-is-refused",
-            "empty-batch-is-accepted",
-            "null-outcomes-are-accepted",
-            "messages-fit",
-            "longer-structs-are-accepted",
-            "shorter-batch-is-refused",
-            "writes-stay-inside",
-            "reads-stay-inside",
-            "inputs-stay-untouched",
-            "results-are-finite",
-            "memory-is-freed",
-            "repeatable",
-            "independent-of-split",
-            "independent-of-order",
-            "independent-of-request",
-            "independent-of-time",
-            "independent-of-layout",
-            "independent-of-thread",
-            "instances-are-independent",
-            "independent-of-earlier-calls",
-            "independent-of-first-instance",
-            "independent-of-environment",
-            "environment-is-left-alone",
-            "prints-nothing",
-            "writes-no-files",
-            "bad-numbers-are-refused",
-            "failing-points-stay-alone",
-            "huge-steps-end-well",
-            "tangent-matches-differences",
-            "rates-match-differences",
-            "tangent-symmetry-as-declared",
-            "linearity-as-declared",
-            "zero-increment-changes-nothing",
-            "initial-states-fit",
-            "hypotheses-agree",
-            "tangential-axis-is-arbitrary",
-            "response-is-isotropic",
-            "compression-is-negative",
-            "angles-are-degrees",
-            "plastic-work-is-not-negative",
-            "elastic-operator-is-plausible",
-            "response-is-continuous",
-            "states-are-carried-on",
-            "plastic-variables-rest",
-            "parameters-matter",
-            "units-belong-together",
-            "results-do-not-blow-up",
-            "paths-leave-elasticity",
-            "sidecar-is-read",
-            "routine-answers",
-            "routine-stays-inside",
-            "routine-is-repeatable",
-            "routine-does-not-begin-again",
-            "routine-stays-at-rest",
-            "time-as-declared",
-            "ddsdde-matches-differences",
-            "routine-agrees-in-the-plane",
-            "tangential-directions-are-alike",
-        ]
+        tests::words::words(
+            "
+file-is-a-library library-opens handshake-is-accepted entry-is-idempotent exports-are-hidden
+manifest-matches description-is-readable description-is-complete units-are-known ranges-are-plausible
+create-works wrong-arguments-are-refused bounds-are-kept initial-states-are-written integrate-works
+unknown-requests-are-refused missing-tangent-is-refused empty-batch-is-accepted
+null-outcomes-are-accepted messages-fit longer-structs-are-accepted shorter-batch-is-refused
+writes-stay-inside reads-stay-inside inputs-stay-untouched results-are-finite memory-is-freed repeatable
+independent-of-split independent-of-order independent-of-request independent-of-time
+independent-of-layout independent-of-thread instances-are-independent independent-of-earlier-calls
+independent-of-first-instance independent-of-environment environment-is-left-alone prints-nothing
+writes-no-files bad-numbers-are-refused failing-points-stay-alone huge-steps-end-well
+tangent-matches-differences rates-match-differences tangent-symmetry-as-declared linearity-as-declared
+zero-increment-changes-nothing initial-states-fit hypotheses-agree tangential-axis-is-arbitrary
+response-is-isotropic compression-is-negative angles-are-degrees plastic-work-is-not-negative
+elastic-operator-is-plausible response-is-continuous states-are-carried-on plastic-variables-rest
+parameters-matter units-belong-together results-do-not-blow-up paths-leave-elasticity sidecar-is-read
+routine-answers routine-stays-inside routine-is-repeatable routine-does-not-begin-again
+routine-stays-at-rest time-as-declared ddsdde-matches-differences routine-agrees-in-the-plane
+tangential-directions-are-alike
+",
+        )
     );
 }
 
 #[test]
 fn a_law_is_found_by_its_id() {
-    let output = pilum(&[
-        "check",
-        "mepi_softening",
-        "--only",
-        "description-is-readable",
-    ]);
+    let output = pilum(&words(
+        "check mepi_softening --only description-is-readable",
+    ));
     let stdout = String::from_utf8(output.stdout).unwrap();
     assert!(stdout.contains("mepi_softening 0.1.0"), "{stdout}");
     assert!(output.status.success());
@@ -250,63 +159,33 @@ fn a_law_is_found_by_its_id() {
 
 #[test]
 fn refuses_what_is_not_there() {
-    for (arguments, code, says) in [
-        (["check", "elastik", "--json"], 3, "did you mean `elastic`?"),
-        (
-            ["check", "no/such/library.so", "--json"],
-            1,
-            "cannot read no/such/library.so",
-        ),
-        (
-            ["inspect", "no/such/library.so", "--json"],
-            1,
-            "cannot read no/such/library.so",
-        ),
-        (
-            ["check", "elastic", "--only=repeatabel"],
-            1,
-            "did you mean `repeatable`?",
-        ),
-    ] {
-        let words = refused(&arguments, code);
-        assert!(words.contains(says), "{arguments:?}: {words}");
+    for [arguments, code, says] in rows_of(
+        "
+check elastik --json | 3 | did you mean `elastic`?
+check no/such/library.so --json | 1 | cannot read no/such/library.so
+inspect no/such/library.so --json | 1 | cannot read no/such/library.so
+check elastic --only=repeatabel | 1 | did you mean `repeatable`?
+",
+    ) {
+        let words = refused(&words(arguments), code.parse().unwrap());
+        assert!(words.contains(says), "{arguments}: {words}");
     }
 }
 
 #[test]
 fn refuses_settings_that_no_law_of_the_library_can_have() {
-    for (law, settings, says) in [
-        (
-            "elastic",
-            &["young_modulos=1e4"][..],
-            "has a parameter `young_modulos`: did you mean `young_modulus`? There is: \
-             poisson_ratio, young_modulus",
-        ),
-        (
-            "elastic",
-            &["young_modulus=-1"],
-            "--set young_modulus=-1: -1 is outside (0, ∞) kPa",
-        ),
-        (
-            "elastic",
-            &["poisson_ratio=NaN"],
-            "NaN is outside (-1, 0.5)",
-        ),
-        (
-            "mepi_softening",
-            &["peak=2"],
-            "2 is outside the choices 0 (continuous), 1 (published)",
-        ),
-        // Each within its bounds, but not together.
-        (
-            "mepi_softening",
-            &["mu_0=0.5", "mu_p=0.2"],
-            "`mepi` under interface_2d accepts no parameters with these values: PILUM_E_PARAMETER",
-        ),
-    ] {
-        let mut arguments = vec!["check", law, "--only=create-works"];
-        arguments.extend(settings.iter().flat_map(|setting| ["--set", *setting]));
-        let words = refused(&arguments, 1);
-        assert!(words.contains(says), "{arguments:?}: {words}");
+    // The last: each within its bounds, but not together.
+    for [law, settings, says] in rows_of(
+        "
+elastic | --set young_modulos=1e4 | has a parameter `young_modulos`: did you mean `young_modulus`? There is: poisson_ratio, young_modulus
+elastic | --set young_modulus=-1 | --set young_modulus=-1: -1 is outside (0, ∞) kPa
+elastic | --set poisson_ratio=NaN | NaN is outside (-1, 0.5)
+mepi_softening | --set peak=2 | 2 is outside the choices 0 (continuous), 1 (published)
+mepi_softening | --set mu_0=0.5 --set mu_p=0.2 | `mepi` under interface_2d accepts no parameters with these values: PILUM_E_PARAMETER
+",
+    ) {
+        let arguments = format!("check {law} --only=create-works {settings}");
+        let words = refused(&words(&arguments), 1);
+        assert!(words.contains(says), "{arguments}: {words}");
     }
 }

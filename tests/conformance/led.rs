@@ -3,6 +3,7 @@
 
 use crate::program::{Report, check, compiled_from, folder, library_of, refused};
 use std::path::{Path, PathBuf};
+use tests::words::has;
 
 /// A routine in C, compiled in this folder. `None`, with a remark, where there is no compiler.
 fn routine(kind: &str, name: &str, folder: &Path) -> Option<PathBuf> {
@@ -155,10 +156,7 @@ fn a_library_of_the_contract_is_not_led_by_an_adapter() {
         &["check", library.to_str().unwrap(), "--driver", &driver],
         1,
     );
-    assert!(
-        words.contains("the library keeps the contract too"),
-        "{words}"
-    );
+    has(&words, "the library keeps the contract too");
     // Without its handshake it is a library of MFront's behaviours.
     let theirs = folder.path().join("libtheirs.so");
     let mut bytes = std::fs::read(&library).unwrap();

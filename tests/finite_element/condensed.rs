@@ -11,8 +11,10 @@ use input::Case;
 use mechanics::equilibrium::Reuse;
 use runs::run::{Options, run_reusing};
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::path::Path;
 use tests::case::{Silent, table};
+use tests::tolerance::close;
 use tests::tolerance::near;
 
 /// The chamber's loading over its first fifth, in variants that differ as given.
@@ -31,15 +33,24 @@ fn chamber(case: &str, variants: &str) -> Vec<Case> {
     Case::load(&file).unwrap()
 }
 
-/// Factorisations by phase.
-fn factorisations(folder: &Path) -> Vec<u64> {
-    let text = std::fs::read_to_string(folder.join("summary.json")).unwrap();
+/// Rows of the history of a run, and its factorisations by phase.
+fn run(case: &Case, reuse: &mut Reuse) -> (Vec<BTreeMap<String, String>>, Vec<u64>) {
+    let folder = tempfile::tempdir().unwrap();
+    let (observer, options) = (&mut Silent::default(), Options::default());
+    run_reusing(case, folder.path(), observer, reuse, options).unwrap();
+    let text = std::fs::read_to_string(folder.path().join("summary.json")).unwrap();
     let summary: Value = serde_json::from_str(&text).unwrap();
-    let phases = summary["phases"].as_array().unwrap();
-    phases
-        .iter()
-        .map(|p| p["factorisations"].as_u64().unwrap())
-        .collect()
+    let phases = summary["phases"].as_array().unwrap().iter();
+    let factorisations = phases.map(|phase| phase["factorisations"].as_u64().unwrap());
+    let rows = table(&folder.path().join("history.csv"));
+    (rows, factorisations.collect())
+}
+
+/// Variants of the chamber, each by itself.
+fn runs(case: &str, variants: &str) -> Vec<(Vec<BTreeMap<String, String>>, Vec<u64>)> {
+    let cases = chamber(case, variants);
+    let alone = cases.iter().map(|case| run(case, &mut Reuse::default()));
+    alone.collect()
 }
 
 #[test]
@@ -48,25 +59,7 @@ fn condensing_the_ground_changes_no_answer() {
         let variants = "[[variant]]\nname = \"condensed\"\nsolver.equations = \"condensed\"\n\
                         [[variant]]\nname = \"sparse\"\nsolver.equations = \"sparse\"\n\
                         [[variant]]\nname = \"auto\"\n";
-        let runs: Vec<_> = chamber(case, variants)
-            .iter()
-            .map(|case| {
-                let folder = tempfile::tempdir().unwrap();
-                let mut observer = Silent::default();
-                run_reusing(
-                    case,
-                    folder.path(),
-                    &mut observer,
-                    &mut Reuse::default(),
-                    Options::default(),
-                )
-                .unwrap();
-                (
-                    table(&folder.path().join("history.csv")),
-                    factorisations(folder.path()),
-                )
-            })
-            .collect();
+        let runs = runs(case, variants);
         let [condensed, sparse, auto] = &runs[..] else {
             panic!("three variants")
         };
@@ -79,7 +72,7 @@ fn condensing_the_ground_changes_no_answer() {
     }
 }
 
-type Rows = [std::collections::BTreeMap<String, String>];
+type Rows = [BTreeMap<String, String>];
 
 /// All probes of this many increments are the same but for 1e-9 of their largest value.
 fn agree(case: &str, condensed: &Rows, sparse: &Rows, increments: usize) {
@@ -92,10 +85,7 @@ fn agree(case: &str, condensed: &Rows, sparse: &Rows, increments: usize) {
         assert_eq!((a.len(), b.len()), (increments, increments));
         let largest = a.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         for (a, b) in a.iter().zip(&b) {
-            assert!(
-                (a - b).abs() <= 1e-9 * largest,
-                "{case}, {probe}: {a} and {b}"
-            );
+            close(format_args!("{case}, {probe}"), *a, *b, 1e-9 * largest);
         }
     }
 }
@@ -119,17 +109,11 @@ normal = "x"
 
 #[test]
 fn where_factorising_is_dear_a_matrix_serves_several_increments() {
-    let run = |method: &str| {
-        let folder = tempfile::tempdir().unwrap();
+    let by = |method: &str| {
         let variants = format!("{FINE}[solver]\nmethod = \"{method}\"\n");
-        let case = &chamber("chamber_mesh1", &variants)[0];
-        let mut reuse = Reuse::default();
-        let (observer, options) = (&mut Silent::default(), Options::default());
-        run_reusing(case, folder.path(), observer, &mut reuse, options).unwrap();
-        let rows = table(&folder.path().join("history.csv"));
-        (rows, factorisations(folder.path()))
+        runs("chamber_mesh1", &variants).remove(0)
     };
-    let ((slow, few), (newton, many)) = (run("auto"), run("newton"));
+    let ((slow, few), (newton, many)) = (by("auto"), by("newton"));
     agree("fine", &slow, &newton, 16);
     // Where it is not dear, three of four.
     assert!(3 * few[2] < 2 * many[2], "{few:?} {many:?}");
@@ -163,19 +147,7 @@ fn what_is_free_and_held_by_turns_is_condensed_once() {
              [[variant]]\nname = \"sparse\"\nsolver.equations = \"sparse\"\n\
              [[variant]]\nname = \"chords\"\nsolver.method = \"initial_stress\"\n"
         );
-        let runs: Vec<_> = chamber(case, &variants)
-            .iter()
-            .map(|case| {
-                let folder = tempfile::tempdir().unwrap();
-                let (mut observer, mut reuse) = (Silent::default(), Reuse::default());
-                let options = Options::default();
-                run_reusing(case, folder.path(), &mut observer, &mut reuse, options).unwrap();
-                (
-                    table(&folder.path().join("history.csv")),
-                    factorisations(folder.path()),
-                )
-            })
-            .collect();
+        let runs = runs(case, &variants);
         agree(case, &runs[0].0, &runs[1].0, 24);
         // The head has moved while it was free.
         let w: Vec<f64> = runs[1]
@@ -212,17 +184,9 @@ fn variants_on_one_mesh_share_the_factors_of_the_ground() {
             // Where nothing follows, nothing is kept.
             (&mut nothing, &mut last),
         ] {
-            let folder = tempfile::tempdir().unwrap();
-            run_reusing(
-                case,
-                folder.path(),
-                &mut Silent::default(),
-                reuse,
-                Options::default(),
-            )
-            .unwrap();
-            rows.push(table(&folder.path().join("history.csv")));
-            factorised.push(factorisations(folder.path())[0]);
+            let (history, factorisations) = run(case, reuse);
+            rows.push(history);
+            factorised.push(factorisations[0]);
         }
     }
     // Each run of its own factorises its ground once: in confinement, swap and loading, though that holds the head,
@@ -240,20 +204,9 @@ fn variants_on_one_mesh_share_the_factors_of_the_ground() {
 #[test]
 fn a_phase_whose_interface_iterates_uses_the_factors_of_the_one_before() {
     let variants = "[[variant]]\nname = \"kept\"\nsolver.method = \"initial_stress\"\n";
-    let folder = tempfile::tempdir().unwrap();
-    let mut reuse = Reuse::default();
-    let case = &chamber("chamber_mesh1", variants)[0];
-    let options = Options::default();
-    run_reusing(
-        case,
-        folder.path(),
-        &mut Silent::default(),
-        &mut reuse,
-        options,
-    )
-    .unwrap();
+    let (_, factorisations) = runs("chamber_mesh1", variants).remove(0);
     // Ground and interface; then the interface alone, though the head is held in the last phase.
-    assert_eq!(factorisations(folder.path()), [2, 1, 1]);
+    assert_eq!(factorisations, [2, 1, 1]);
 }
 
 /// Phases on the same unknowns: the linear part of the one before is taken only where nothing in it has changed.
@@ -265,16 +218,8 @@ fn ground_that_is_another_from_a_phase_on_is_condensed_anew() {
                     displacement = [{ line = \"pile_head\", z = -0.0012 }]\n\
                     [[variant]]\nname = \"condensed\"\nsolver.equations = \"condensed\"\n\
                     [[variant]]\nname = \"sparse\"\nsolver.equations = \"sparse\"\n";
-    let runs: Vec<_> = chamber("chamber_mesh1", variants)
-        .iter()
-        .map(|case| {
-            let folder = tempfile::tempdir().unwrap();
-            let (mut observer, mut reuse) = (Silent::default(), Reuse::default());
-            let options = Options::default();
-            run_reusing(case, folder.path(), &mut observer, &mut reuse, options).unwrap();
-            table(&folder.path().join("history.csv"))
-        })
-        .collect();
+    let runs = runs("chamber_mesh1", variants);
+    let runs: Vec<_> = runs.into_iter().map(|(rows, _)| rows).collect();
     let last = |run: usize| runs[run].last().unwrap()["q_t"].parse::<f64>().unwrap();
     assert!(runs[0].len() == runs[1].len() && runs[0].len() == 20);
     near(last(0), last(1), 1e-9 * last(1).abs());

@@ -5,6 +5,7 @@ use std::fs;
 use std::process::Command;
 use tests::case::column;
 use tests::place::{Place, built_program, repository};
+use tests::words::has;
 
 #[test]
 fn the_archive_has_all_its_parts() {
@@ -96,10 +97,7 @@ fn the_main_case_runs_as_it_does_where_it_is_built() {
     assert!(report.contains("</html>"));
     let summary = fs::read_to_string(results.join("summary.json")).unwrap();
     let prefix = place.prefix.to_str().unwrap();
-    assert!(
-        summary.contains(&format!("{prefix}/lib/pilum/libmepi.so")),
-        "{summary}"
-    );
+    has(&summary, format!("{prefix}/lib/pilum/libmepi.so"));
 
     let case = repository().join("cases/chamber_mesh1");
     let built = Command::new(built_program())
@@ -226,10 +224,7 @@ fn a_program_without_laws_says_where_it_looks() {
     }
     let told = place.done("", "alone/bin/pilum laws --where");
     assert!(told.contains(looked_in.to_str().unwrap()), "{told}");
-    assert!(
-        told.contains("installed with the program: there is no such folder"),
-        "{told}"
-    );
+    has(&told, "installed with the program: there is no such folder");
 
     // With the laws where it says, or named, the case runs.
     let laws = place.prefix.join("lib/pilum");

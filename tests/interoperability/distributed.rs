@@ -7,6 +7,7 @@ use crate::assert_close;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use tests::needs;
+use tests::words::rows_of;
 
 /// Forces on one rank and on two, and before and after a stop: what sums in another order leave.
 const RANKS: f64 = 1e-9;
@@ -183,49 +184,24 @@ fn mistakes_end_all_ranks_with_a_message() {
     let Some(python) = python() else { return };
     let place = tempfile::tempdir().unwrap();
     let base = toml::Value::from(case().join("case.toml").to_str().unwrap());
-    for (change, code, message) in [
-        (
-            "laws.joint.law = \"coulomb_joynt\"",
-            3,
-            "error: no library with law `coulomb_joynt`",
-        ),
-        (
-            "laws.joint.parameters.frictoin_angle = 3.0",
-            1,
-            "no parameter `frictoin_angle`",
-        ),
-        ("laws.joint.law = \"mohr_coulomb\"", 1, "interface_2d"),
-        (
-            "groups.soil.integration = \"reduced\"",
-            1,
-            "groups.soil.integration: solids have 3 × 3 points here",
-        ),
-        (
-            "groups.soil.unit_weight = 18.0",
-            1,
-            "groups.soil.unit_weight: not in a distributed run",
-        ),
-        (
-            "[[phase]]\nname = \"push\"\nincrements = 1\ndisplacement = [{ line = \"pile_head\", z = -0.3 }]",
-            2,
-            "increment 1 of 1: ",
-        ),
-        // A law that cannot start there.
-        (
-            "laws.loose = { law = \"mepi\", parameters = { k_n = 1e5, k_t = 1e5, n = 0.5, mu_0 = 0.2, mu_p = 0.7, \
-             mu_c0 = 0.4, a = 0.01, c_0 = 40.0, t = 0.002, p_0 = 100.0 } }\n\
-             groups.joint.law = \"loose\"\n\
-             groups.soil.initial_stress = { 11 = 0.0 }\ngroups.pile.initial_stress = { 11 = 0.0 }",
-            3,
-            "rank 0: at (0.01, ",
-        ),
-    ] {
+    // The last one is of a law that cannot start there.
+    for [change, code, message] in rows_of(
+        r#"
+laws.joint.law = "coulomb_joynt" | 3 | error: no library with law `coulomb_joynt`
+laws.joint.parameters.frictoin_angle = 3.0 | 1 | no parameter `frictoin_angle`
+laws.joint.law = "mohr_coulomb" | 1 | interface_2d
+groups.soil.integration = "reduced" | 1 | groups.soil.integration: solids have 3 × 3 points here
+groups.soil.unit_weight = 18.0 | 1 | groups.soil.unit_weight: not in a distributed run
+[[phase]]\nname = "push"\nincrements = 1\ndisplacement = [{ line = "pile_head", z = -0.3 }] | 2 | increment 1 of 1:
+laws.loose = { law = "mepi", parameters = { k_n = 1e5, k_t = 1e5, n = 0.5, mu_0 = 0.2, mu_p = 0.7, mu_c0 = 0.4, a = 0.01, c_0 = 40.0, t = 0.002, p_0 = 100.0 } }\ngroups.joint.law = "loose"\ngroups.soil.initial_stress = { 11 = 0.0 }\ngroups.pile.initial_stress = { 11 = 0.0 } | 3 | rank 0: at (0.01,
+"#,
+    ) {
         let file = place.path().join("wrong.toml");
         std::fs::write(&file, format!("base = {base}\n{change}\n")).unwrap();
         let arguments = [file.to_str().unwrap(), "--variant", "m200"];
         refused(
             &on_ranks(&python, 2, &arguments, &place.path().join("wrong")),
-            code,
+            code.parse().unwrap(),
             message,
         );
     }

@@ -241,19 +241,16 @@ fn what_cannot_be_carried_is_named() {
         left(Program::Calculix),
         ["solver", "probes.h", "probes.s", "phase"]
     );
+    let ogs = Program::Ogs;
     for (program, setting, key) in [
         (
             Program::Calculix,
             "groups.soil.law=\"soil\"",
             "groups.soil.law",
         ),
+        (ogs, "laws.soil.parameters.tensile_strength=1.0", ""),
         (
-            Program::Ogs,
-            "laws.soil.parameters.tensile_strength=1.0",
-            "",
-        ),
-        (
-            Program::Ogs,
+            ogs,
             "groups.soil.initial_stress={ k_0 = 0.5 }",
             "groups.soil.initial_stress",
         ),
@@ -262,13 +259,9 @@ fn what_cannot_be_carried_is_named() {
             "groups.soil.active=false",
             "groups.soil.active",
         ),
+        (ogs, "phase.push.activate=[\"soil\"]", "phase.push.activate"),
         (
-            Program::Ogs,
-            "phase.push.activate=[\"soil\"]",
-            "phase.push.activate",
-        ),
-        (
-            Program::Ogs,
+            ogs,
             "phase.push.displacement=[{ line = \"top\", y = 0.0 }]",
             "phase.push.displacement",
         ),

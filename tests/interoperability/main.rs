@@ -18,6 +18,7 @@ use std::env;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use tests::needs::{self, installed, is_there};
+use tests::words::rows_of;
 
 /// The library of a law, where the test program was built.
 fn library(law: &str) -> PathBuf {
@@ -38,17 +39,16 @@ const KRATOS: &str = "kratos/bin/python";
 
 #[test]
 fn a_missing_program_is_named() {
-    for (test, program) in [
-        ("opengeosys::elastic_gives_our_stresses", "opengeosys"),
-        ("mfront::other_behaviours_of_opengeosys_run", "opengeosys"),
-        ("kratos::mohr_coulomb_gives_our_head_force", "kratos"),
-        ("exchange::opengeosys_gives_our_table", "opengeosys"),
-        ("exchange::kratos_gives_our_table", "kratos"),
-        (
-            "salib::indices_of_the_ishigami_function_are_those_of_salib",
-            "salib",
-        ),
-    ] {
+    for [test, program] in rows_of(
+        "
+opengeosys::elastic_gives_our_stresses | opengeosys
+mfront::other_behaviours_of_opengeosys_run | opengeosys
+kratos::mohr_coulomb_gives_our_head_force | kratos
+exchange::opengeosys_gives_our_table | opengeosys
+exchange::kratos_gives_our_table | kratos
+salib::indices_of_the_ishigami_function_are_those_of_salib | salib
+",
+    ) {
         let what = format!("{program} (tests/interoperability/install.sh)");
         needs::assert_named(test, &what);
     }

@@ -4,6 +4,7 @@ use crate::{beside, installed, is_there, last_line};
 use results::study::indices;
 use serde_json::Value;
 use std::process::Command;
+use tests::tolerance::close;
 
 const SALIB: &str = "salib/bin/python";
 
@@ -27,10 +28,7 @@ fn indices_of_the_ishigami_function_are_those_of_salib() {
     for (i, of) in ours.iter().enumerate() {
         for (estimate, key) in [(of.first, "S1"), (of.total, "ST")] {
             let expected = column(&theirs, key)[i];
-            assert!(
-                (estimate.value - expected).abs() < 1e-12,
-                "{key} {i}: {estimate:?}"
-            );
+            close(format_args!("{key} {i}"), estimate.value, expected, 1e-12);
             let [low, high] = estimate.interval.unwrap();
             let half = column(&theirs, &format!("{key}_conf"))[i];
             assert!(

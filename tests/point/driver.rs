@@ -5,6 +5,10 @@ use runs::point::PointReport;
 use std::path::Path;
 use text::Source;
 
+/// MEPI of Table IV (1) of De Gennaro & Frank, with the p_0 that makes it dilate.
+pub(crate) const MEPI: &str = "[parameters]\nk_n = 0.86e5\nk_t = 0.37e5\nn = 0.55\n\
+    mu_0 = 0.27\nmu_p = 0.7\nmu_c0 = 0.46\na = 0.008\nc_0 = 40\nt = 0.002\np_0 = 100\n";
+
 /// What a driver gave: rows as far as it came, and how it ended.
 #[derive(Debug)]
 pub(crate) struct Run {

@@ -5,7 +5,7 @@
 //! Law         elastic, coulomb_joint, mepi.
 //! Asserts     exit code, key facts of the message, the underlined text.
 
-use crate::driver::attempt;
+use crate::driver::{MEPI, attempt};
 use input::{Driver, Error};
 use text::Source;
 
@@ -215,7 +215,7 @@ fn initial_states_that_the_law_refuses() {
     let mepi = |traction: &str| {
         format!(
             "law = 'mepi'\nhypothesis = 'interface_2d'\n{}[initial]\n{traction}\n{SEGMENT}",
-            crate::mepi::PARAMETERS
+            MEPI
         )
     };
     refuses(
@@ -223,6 +223,12 @@ fn initial_states_that_the_law_refuses() {
         &["mepi", "initial", "compressive", "tension is positive"],
     );
     refuses(&mepi(""), &["mepi", "compressive"]);
+    let halved = mepi("traction = { n = -100 }").replacen(
+        "t = 0.002",
+        "t = 0.002\nscheme = 'explicit'\nsubsteps = 2.5",
+        1,
+    );
+    refuses(&halved, &["substeps", "2.5"]);
     // The law refuses this one in its first update.
     let run = attempt(&mepi(
         "traction = { n = -100 }\ninternal = { plastic_slip = -1 }",

@@ -7,6 +7,7 @@
 
 use crate::driver::{attempt, follow};
 use approx::assert_relative_eq;
+use tests::words::edited;
 
 const K_T: f64 = 4e5;
 const PHI: f64 = 30.0;
@@ -120,47 +121,32 @@ fn all_directions_are_alike() {
 
 #[test]
 fn mistakes_are_told_at_their_place() {
-    let segment = "[[segment]]\nincrements = 1\n";
+    let driver = |hypothesis: &str, control: &str| {
+        let start = joint(hypothesis, 0.0);
+        format!("{start}[[segment]]\nincrements = 1\ncontrol = {{ {control} }}")
+    };
+    let three = driver("interface_3d", "");
     for (text, said) in [
         (
-            format!(
-                "{}{segment}control = {{ s = {{ jump = 1e-3 }} }}",
-                joint("interface_2d", 0.0)
-            ),
-            [
-                "there is no component `s` under interface_2d",
-                "components: n, t",
-            ],
+            driver("interface_2d", "s = { jump = 1e-3 }"),
+            "there is no component `s` under interface_2d | components: n, t",
         ),
         (
-            format!(
-                "{}{segment}control = {{ s = {{ strain = 1e-3 }} }}",
-                joint("interface_3d", 0.0)
-            ),
-            [
-                "component `s` cannot be controlled by `strain` under interface_3d",
-                "jump, traction, stiffness",
-            ],
+            driver("interface_3d", "s = { strain = 1e-3 }"),
+            "component `s` cannot be controlled by `strain` under interface_3d | jump, traction, stiffness",
         ),
         (
-            joint("interface_3d", 0.0).replacen("traction =", "stress =", 1)
-                + segment
-                + "control = {}",
-            [
-                "under interface_3d the initial state is a traction",
-                "components n, t, s",
-            ],
+            edited(&three, &["traction = => stress ="]),
+            "under interface_3d the initial state is a traction | components n, t, s",
         ),
         (
-            joint("interface_3d", 0.0).replacen("coulomb_joint", "mepi", 1)
-                + segment
-                + "control = {}",
-            ["interface_3d", "interface_2d"],
+            edited(&three, &["coulomb_joint => mepi"]),
+            "interface_3d | interface_2d",
         ),
     ] {
         let run = attempt(&text);
         let message = format!("{} {:?}", run.error(), run.error());
-        for words in said {
+        for words in said.split(" | ") {
             assert!(message.contains(words), "{message}");
         }
     }

@@ -1,5 +1,6 @@
-//! Single-point tests: each law, through its library and the point driver, against closed forms
-//! and quadratures that do not use the law's code; and the rules of the driver one by one.
+//! Single-point tests: laws, through their libraries and the point driver, against closed forms that do not use
+//! the laws' code; and the rules of the driver one by one. MEPI is held against the quadrature of its rates in
+//! `extremes/`, and against its equations in `cases/shear_box.rs`; joints with histories in `cases/joint_laws.rs`.
 #![allow(
     clippy::unwrap_used,
     clippy::expect_used,
@@ -10,19 +11,11 @@
 
 mod coulomb_joint;
 mod critical_state_joint;
-mod cyclic_joint;
 mod driver;
-mod elastic;
-mod hyperbolic_joint;
 mod input_errors;
 mod interface_3d;
-mod mepi;
-mod mepi_softening;
-mod mepi_truth;
 mod mohr_coulomb;
 mod openers;
-mod oriented_mohr_coulomb;
 mod rules;
 mod runaway;
 mod singular;
-mod tz_curve;

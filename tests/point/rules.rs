@@ -5,8 +5,7 @@
 //! Law         elastic, coulomb_joint, mepi, mohr_coulomb.
 //! Asserts     values, warnings, exit codes, files.
 
-use crate::driver::{attempt, csv, follow};
-use crate::mepi::PARAMETERS;
+use crate::driver::{MEPI, attempt, csv, follow};
 use approx::assert_relative_eq;
 use runs::point::run_file;
 use std::fs;
@@ -182,7 +181,7 @@ fn a_state_inside_or_on_the_surface_gives_no_warning() {
 #[test]
 fn internal_variables_can_be_given() {
     let run = follow(&format!(
-        "law = 'mepi'\nhypothesis = 'interface_2d'\n{PARAMETERS}[initial]\ntraction = {{ n = -100 }}\n\
+        "law = 'mepi'\nhypothesis = 'interface_2d'\n{MEPI}[initial]\ntraction = {{ n = -100 }}\n\
          internal = {{ plastic_slip = 1 }}\n[[segment]]\nincrements = 1\n\
          control = {{ t = {{ jump = 1e-3 }} }}"
     ));

@@ -1,4 +1,4 @@
-//! What the tests share: running cases from a text, reading results, tolerances, programs of others.
+//! What the tests share: running cases from a text, tables of cases, reading results, tolerances, programs of others.
 
 pub mod case;
 pub mod figure;
@@ -7,3 +7,4 @@ pub mod needs;
 pub mod outcome;
 pub mod place;
 pub mod tolerance;
+pub mod words;

@@ -1,5 +1,7 @@
 //! Tolerances and where they come from.
 
+use std::fmt::Display;
+
 /// A few hundred operations in double precision, relative to the largest number in play.
 pub const ROUND_OFF: f64 = 1e-12;
 /// Equilibrium: the solver's default force tolerance with a margin for its norm.
@@ -13,8 +15,17 @@ pub const DRIVER: f64 = 1e-9;
 /// With both numbers, otherwise.
 #[track_caller]
 pub fn near(found: f64, expected: f64, tolerance: f64) {
+    close("value", found, expected, tolerance);
+}
+
+/// The same of what has a name.
+///
+/// # Panics
+/// With name and numbers, otherwise.
+#[track_caller]
+pub fn close(what: impl Display, found: f64, expected: f64, tolerance: f64) {
     assert!(
         (found - expected).abs() <= tolerance,
-        "{found:e}, expected {expected:e} within {tolerance:e}"
+        "{what}: {found:e}, expected {expected:e} within {tolerance:e}"
     );
 }

@@ -2,22 +2,20 @@
 //! announced.
 #![allow(clippy::unwrap_used, reason = "tests panic to fail")]
 
-use law::{Hypothesis, Operator, SearchPath};
+mod common;
+
+use common::{held, material};
+use law::{Hypothesis, Operator};
 use mechanics::assembly::{Elements, System};
-use mechanics::problem::{Analysis, Axis, ElementGroup, Formulation, Phase, Support};
-use mechanics::{Material, Mesh, Model, Problem};
+use mechanics::problem::{Analysis, Axis, ElementGroup, Formulation, Phase};
+use mechanics::{Mesh, Model, Problem};
 
 const COLUMNS: usize = 20;
 
 /// A group of a law of this workspace under 100 kPa.
 fn group(id: &str, values: &[(&str, f64)]) -> ElementGroup {
-    let deps = std::env::current_exe().unwrap();
-    let deps = deps.parent().unwrap().to_owned();
-    let search = SearchPath::new(&[deps.clone(), deps.parent().unwrap().to_owned()]);
-    let values: Vec<_> = values.iter().map(|&(id, v)| (id, v.into())).collect();
-    let law = search.law(id).unwrap();
-    let law = law.with(Hypothesis::PlaneStrain, &values).unwrap();
-    let mut group = ElementGroup::new(id, Formulation::Solid, Material::new(id, law));
+    let material = material(id, Hypothesis::PlaneStrain, values);
+    let mut group = ElementGroup::new(id, Formulation::Solid, material);
     group.initial_stress = Some([-100.0, -100.0, -100.0, 0.0].into());
     group
 }
@@ -41,10 +39,7 @@ fn soil() -> Problem {
         group("mohr_coulomb", &[&stiffness[..], &strength].concat()),
         group("elastic", &stiffness),
     ];
-    problem.supports = vec![Support {
-        line: "bottom".to_owned(),
-        fixed: vec![Axis::X, Axis::Y],
-    }];
+    problem.supports = vec![held("bottom", &[Axis::X, Axis::Y])];
     problem.phases = vec![Phase::new("push", 1)];
     problem
 }

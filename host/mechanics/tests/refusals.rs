@@ -2,7 +2,10 @@
 //! is in no file.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests panic to fail")]
 
-use law::{Hypothesis, SearchPath};
+mod common;
+
+use common::{held, insert_joints, name};
+use law::Hypothesis;
 use mechanics::check::{Cause, Item, JointFault, Refusal};
 use mechanics::mesh::{Along, CannotInsert};
 use mechanics::problem::{
@@ -10,45 +13,21 @@ use mechanics::problem::{
 };
 use mechanics::{Error, Material, Mesh, Problem, Simulation};
 
-fn material(id: &str, hypothesis: Hypothesis, values: &[(&str, f64)]) -> Material {
-    let target = std::env::current_exe().unwrap();
-    let deps = target.parent().unwrap().to_owned();
-    let search = SearchPath::new(&[deps.clone(), deps.parent().unwrap().to_owned()]);
-    let values: Vec<_> = values.iter().map(|&(id, v)| (id, v.into())).collect();
-    let law = search.law(id).unwrap().with(hypothesis, &values).unwrap();
-    Material::new(id, law)
-}
-
 fn elastic() -> Material {
-    let values = [("young_modulus", 1e4), ("poisson_ratio", 0.25)];
-    material("elastic", Hypothesis::PlaneStrain, &values)
+    common::elastic(Hypothesis::PlaneStrain, 1e4, 0.25)
 }
 
 fn joint() -> Material {
-    let values = [
-        ("normal_stiffness", 1e6),
-        ("shear_stiffness", 1e6),
-        ("cohesion", 10.0),
-        ("friction_angle", 30.0),
-        ("dilatancy_angle", 0.0),
-    ];
-    material("coulomb_joint", Hypothesis::Interface2d, &values)
+    common::joint([1e6; 2], 10.0, 30.0)
 }
 
 /// Two blocks, `lower` and `upper`, with `joint` between them, for one phase.
 fn blocks() -> Problem {
     let mut mesh = Mesh::grid(&[0.0, 0.5, 1.0], &[0.0, 1.0, 2.0], |_, row| row);
-    for (name, height) in [("bottom", 0.0), ("joint", 1.0), ("top", 2.0)] {
-        mesh.name_line(name, |edge| {
-            edge.iter().all(|node| (node[1] - height).abs() < 1e-9)
-        });
+    for (line, height) in [("bottom", 0.0), ("joint", 1.0), ("top", 2.0)] {
+        name(&mut mesh, line, 1, height);
     }
-    mesh.insert_joints(&[Along {
-        line: "joint".to_owned(),
-        group: 2,
-        opens_ends: true,
-    }])
-    .unwrap();
+    insert_joints(&mut mesh, &[("joint", 2)]);
     let mut problem = Problem::new(Analysis::PlaneStrain, mesh);
     problem.groups = vec![
         ElementGroup::new("lower", Formulation::Solid, elastic()),
@@ -56,10 +35,7 @@ fn blocks() -> Problem {
         ElementGroup::new("joint", Formulation::ZeroThickness, joint()),
     ];
     problem.supports = ["bottom", "top"]
-        .map(|line| Support {
-            line: line.to_owned(),
-            fixed: vec![Axis::X, Axis::Y],
-        })
+        .map(|line| held(line, &[Axis::X, Axis::Y]))
         .to_vec();
     problem.phases = vec![Phase::new("rest", 1)];
     problem

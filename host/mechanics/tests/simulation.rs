@@ -7,48 +7,26 @@
     reason = "tests panic to fail; equal bits are meant"
 )]
 
-use law::{Hypothesis, SearchPath};
-use mechanics::mesh::{Along, Solid};
+mod common;
+
+use common::{cut, held, insert_joints, joint, material, name, name_sides, pressed};
+use law::Hypothesis;
 use mechanics::problem::{
-    Analysis, Axis, Displacement, ElementGroup, Formulation, InitialStress, Phase, Pressure,
-    Support,
+    Analysis, Axis, Displacement, ElementGroup, Formulation, InitialStress, Phase,
 };
 use mechanics::{Error, Material, Mesh, Problem, Simulation};
 
 const E: f64 = 1e4;
 const NU: f64 = 0.25;
 
-/// A law of this workspace with its values.
-fn material(id: &str, hypothesis: Hypothesis, values: &[(&str, f64)]) -> Material {
-    let target = std::env::current_exe().unwrap();
-    let deps = target.parent().unwrap().to_owned();
-    let search = SearchPath::new(&[deps.clone(), deps.parent().unwrap().to_owned()]);
-    let values: Vec<_> = values.iter().map(|&(id, v)| (id, v.into())).collect();
-    let law = search.law(id).unwrap().with(hypothesis, &values).unwrap();
-    Material::new(id, law)
-}
-
 fn elastic(hypothesis: Hypothesis) -> Material {
-    let values = [("young_modulus", E), ("poisson_ratio", NU)];
-    material("elastic", hypothesis, &values)
+    common::elastic(hypothesis, E, NU)
 }
 
-fn joint(friction_angle: f64) -> Material {
-    let values = [
-        ("normal_stiffness", 1e7),
-        ("shear_stiffness", 1e6),
-        ("cohesion", 0.0),
-        ("friction_angle", friction_angle),
-        ("dilatancy_angle", 0.0),
-    ];
-    material("coulomb_joint", Hypothesis::Interface2d, &values)
-}
-
-fn held(line: &str, fixed: &[Axis]) -> Support {
-    Support {
-        line: line.to_owned(),
-        fixed: fixed.to_vec(),
-    }
+/// Quads of a grid, each cut into two triangles along one diagonal or the other.
+fn triangles(mut mesh: Mesh) -> Mesh {
+    cut(&mut mesh, |number| Some(number % 2 == 0));
+    mesh
 }
 
 fn moved(line: &str, x: Option<f64>, y: Option<f64>) -> Displacement {
@@ -56,69 +34,28 @@ fn moved(line: &str, x: Option<f64>, y: Option<f64>) -> Displacement {
     Displacement { line, x, y }
 }
 
-/// Names the four sides of a rectangle with its lower left corner at the origin.
-fn name_sides(mesh: &mut Mesh, [width, height]: [f64; 2]) {
-    let sides = [
-        ("left", 0, 0.0),
-        ("right", 0, width),
-        ("bottom", 1, 0.0),
-        ("top", 1, height),
-    ];
-    for (name, c, at) in sides {
-        mesh.name_line(name, |edge| {
-            edge.iter().all(|node| (node[c] - at).abs() < 1e-12)
-        });
-    }
-}
-
-/// Quads of a grid, each cut into two triangles along one diagonal or the other.
-fn triangles(mut mesh: Mesh) -> Mesh {
-    let quads = std::mem::take(&mut mesh.solids);
-    for (number, quad) in quads.iter().enumerate() {
-        let [a, b, c, d, ab, bc, cd, da] = quad.nodes().try_into().unwrap();
-        let (first, second) = if number % 2 == 0 { (a, c) } else { (b, d) };
-        let middle = mesh.nodes.len();
-        let ends = [first, second].map(|node| mesh.nodes[node]);
-        mesh.nodes
-            .push([0, 1].map(|i| f64::midpoint(ends[0][i], ends[1][i])));
-        let halves = if number % 2 == 0 {
-            [[a, b, c, ab, bc, middle], [a, c, d, middle, cd, da]]
-        } else {
-            [[a, b, d, ab, middle, da], [b, c, d, bc, cd, middle]]
-        };
-        let group = quad.group;
-        mesh.solids
-            .extend(halves.map(|nodes| Solid::triangle(nodes, group)));
-    }
-    mesh
-}
-
 /// A block that slides on another under a pressure: top loaded, then pushed sideways.
 fn sliding(mesh: fn(Mesh) -> Mesh, friction_angle: f64) -> Problem {
     let grid = Mesh::grid(&[0.0, 0.5, 1.0], &[0.0, 0.5, 1.0], |_, row| row);
     let mut mesh = mesh(grid);
-    name_sides(&mut mesh, [1.0, 1.0]);
-    mesh.name_line("joint", |edge| edge.iter().all(|node| node[1] == 0.5));
-    mesh.insert_joints(&[Along {
-        line: "joint".to_owned(),
-        group: 2,
-        opens_ends: true,
-    }])
-    .unwrap();
+    name_sides(&mut mesh);
+    name(&mut mesh, "joint", 1, 0.5);
+    insert_joints(&mut mesh, &[("joint", 2)]);
     let mut problem = Problem::new(Analysis::PlaneStrain, mesh);
     let solid =
         |name: &str| ElementGroup::new(name, Formulation::Solid, elastic(Hypothesis::PlaneStrain));
     problem.groups = vec![
         solid("lower"),
         solid("upper"),
-        ElementGroup::new("joint", Formulation::ZeroThickness, joint(friction_angle)),
+        ElementGroup::new(
+            "joint",
+            Formulation::ZeroThickness,
+            joint([1e7, 1e6], 0.0, friction_angle),
+        ),
     ];
     problem.supports = vec![held("bottom", &[Axis::X, Axis::Y])];
     let mut press = Phase::new("press", 2);
-    press.pressure = vec![Pressure {
-        line: "top".to_owned(),
-        value: 100.0.into(),
-    }];
+    press.pressure = pressed("top", 100.0);
     press.displacement = vec![moved("top", Some(0.0), None)];
     let mut push = Phase::new("push", 8);
     push.displacement = vec![moved("top", Some(0.1), None)];
@@ -152,7 +89,7 @@ fn a_block_slides_at_its_friction() {
 fn triangles_carry_a_linear_field_exactly() {
     let ring = |analysis| {
         let mut mesh = triangles(Mesh::grid(&[0.0, 0.3, 1.0], &[0.0, 0.8, 2.0], |_, _| 0));
-        name_sides(&mut mesh, [1.0, 2.0]);
+        name_sides(&mut mesh);
         let mut problem = Problem::new(analysis, mesh);
         let hypothesis = match analysis {
             Analysis::PlaneStrain => Hypothesis::PlaneStrain,
@@ -223,10 +160,7 @@ fn the_largest_forces_of_earlier_phases_are_gone_on_with() {
     let mut problem = sliding(|mesh| mesh, 30.0);
     let pressed = |name: &str, value: f64| {
         let mut phase = Phase::new(name, 2);
-        phase.pressure = vec![Pressure {
-            line: "top".to_owned(),
-            value: value.into(),
-        }];
+        phase.pressure = pressed("top", value);
         phase
     };
     let rest = ["rest", "rest on", "rest still"].map(|name| Phase::new(name, 2));
@@ -270,7 +204,7 @@ fn a_layer_whose_stiffness_follows_the_stress_is_gone_on_from() {
     let mut mesh = Mesh::grid(&[0.0, 0.5, 1.0], &[0.0, 0.5, 0.51, 1.0], |_, row| {
         usize::from(row == 1)
     });
-    name_sides(&mut mesh, [1.0, 1.0]);
+    name_sides(&mut mesh);
     let mut problem = Problem::new(Analysis::PlaneStrain, mesh);
     let values = [
         ("normal_stiffness", 1e6),
@@ -290,10 +224,7 @@ fn a_layer_whose_stiffness_follows_the_stress_is_gone_on_from() {
     problem.groups = vec![blocks, layer];
     problem.supports = vec![held("bottom", &[Axis::X, Axis::Y])];
     let mut press = Phase::new("press", 2);
-    press.pressure = vec![Pressure {
-        line: "top".to_owned(),
-        value: 200.0.into(),
-    }];
+    press.pressure = pressed("top", 200.0);
     press.displacement = vec![moved("top", Some(0.0), None)];
     let mut push = Phase::new("push", 3);
     push.displacement = vec![moved("top", Some(1e-3), None)];
@@ -323,7 +254,7 @@ fn a_tilted_line_that_became_rigid_is_led_to_one_place() {
     }
     let push = |kpa: f64, resets: bool, line: &str| {
         let mut mesh = Mesh::grid(&[0.0, 0.5, 1.0], &[0.0, 1.0], |column, _| column);
-        name_sides(&mut mesh, [1.0, 1.0]);
+        name_sides(&mut mesh);
         let ends = mesh.lines["top"].nodes.iter().copied();
         let ends = ends.filter(|&node| (mesh.nodes[node][0] - 0.5).abs() > 0.4);
         let nodes = ends.collect();
@@ -341,10 +272,7 @@ fn a_tilted_line_that_became_rigid_is_led_to_one_place() {
         ];
         problem.supports = vec![held("bottom", &[Axis::X, Axis::Y])];
         let mut press = Phase::new("press", 1);
-        press.pressure = vec![Pressure {
-            line: "top".to_owned(),
-            value: kpa.into(),
-        }];
+        press.pressure = pressed("top", kpa);
         let mut rest = Phase::new("rest", 1);
         rest.rigid = vec!["top".to_owned()];
         let mut push = Phase::new("push", 1);
@@ -384,7 +312,7 @@ fn a_tilted_line_that_became_rigid_is_led_to_one_place() {
 fn a_rigid_line_that_is_pulled_apart_later_is_refused_at_once() {
     let with = |resets: bool, back: f64| {
         let mut mesh = Mesh::grid(&[0.0, 0.5, 1.0], &[0.0, 1.0], |_, _| 0);
-        name_sides(&mut mesh, [1.0, 1.0]);
+        name_sides(&mut mesh);
         let mut problem = Problem::new(Analysis::PlaneStrain, mesh);
         problem.groups = vec![ElementGroup::new(
             "block",
@@ -422,7 +350,7 @@ fn a_rigid_line_that_is_pulled_apart_later_is_refused_at_once() {
 #[test]
 fn a_node_that_leads_a_rigid_line_has_its_reaction() {
     let mut mesh = Mesh::grid(&[0.0, 0.5, 1.0], &[0.0, 1.0], |_, _| 0);
-    name_sides(&mut mesh, [1.0, 1.0]);
+    name_sides(&mut mesh);
     let corner = mesh.nodes.iter().position(|at| *at == [1.0, 1.0]).unwrap();
     let point = mechanics::mesh::Line {
         nodes: vec![corner],

@@ -6,6 +6,7 @@
 
 use super::*;
 use approx::assert_relative_eq;
+use walk::{Walker, random};
 
 const K_N: f64 = 2e6;
 
@@ -45,52 +46,6 @@ fn strength(p: &Parameters, sigma: f64) -> f64 {
 fn hyperbola(p: &Parameters, sigma: f64, slip: f64) -> f64 {
     let tau_f = strength(p, sigma);
     (slip / (1.0 / k_i(p, sigma) + p.failure_ratio * slip / tau_f)).min(tau_f)
-}
-
-/// An interface on a path.
-#[derive(Clone, Copy, Debug)]
-struct Walker {
-    law: HyperbolicJoint,
-    traction: [f64; 2],
-    state: State,
-}
-
-impl Walker {
-    fn new(law: HyperbolicJoint, traction: [f64; 2]) -> Self {
-        let state = law.initial_state(&traction).unwrap();
-        Self {
-            law,
-            traction,
-            state,
-        }
-    }
-
-    fn respond(&self, jump_increment: [f64; 2], tangent: Tangent) -> InterfaceResponse<State> {
-        let point = InterfacePoint {
-            jump: [0.0; 2],
-            jump_increment,
-            traction: self.traction,
-            state: self.state,
-            time: 0.0,
-            time_increment: 1.0,
-            step_time: 0.0,
-        };
-        self.law.update(&point, tangent).unwrap()
-    }
-
-    fn step(&mut self, jump_increment: [f64; 2]) -> [[f64; 2]; 2] {
-        let end = self.respond(jump_increment, Tangent::Consistent);
-        self.traction = end.traction;
-        self.state = end.state;
-        end.tangent
-    }
-
-    fn walk(mut self, jump: [f64; 2], n: u32) -> Self {
-        for _ in 0..n {
-            self.step(jump.map(|j| j / f64::from(n)));
-        }
-        self
-    }
 }
 
 #[test]
@@ -383,7 +338,7 @@ fn refuses_parameters_that_do_not_go_together() {
 fn the_elastic_operator_is_that_of_unloading() {
     let mut walker = Walker::new(joint(SAND), [-100.0, 0.0]);
     for jump in [[0.0, 1e-5], [-2e-5, 1e-2], [1e-1, 0.0], [-2e-1, 1e-3]] {
-        let end = walker.respond(jump, Tangent::Elastic);
+        let end = walker.respond(jump, Tangent::Elastic).unwrap();
         let k_u = k_u(&SAND, -end.traction[0]);
         assert_eq!((end.tangent[0], end.tangent[1][0]), ([K_N, 0.0], 0.0));
         assert_relative_eq!(end.tangent[1][1], k_u, max_relative = 1e-12);
@@ -400,9 +355,9 @@ fn an_open_interface_has_no_elastic_shear_whatever_the_exponent() {
         });
         let mut walker = Walker::new(law, [-100.0, 0.0]);
         walker.step([1e-1, 0.0]);
-        let open = walker.respond([1e-3, 1e-3], Tangent::Elastic);
+        let open = walker.respond([1e-3, 1e-3], Tangent::Elastic).unwrap();
         assert_eq!(open.tangent, [[K_N, 0.0], [0.0, 0.0]]);
-        let closed = walker.respond([-2e-1, 0.0], Tangent::Elastic);
+        let closed = walker.respond([-2e-1, 0.0], Tangent::Elastic).unwrap();
         assert!(closed.tangent[1][1] > 0.0);
     }
 }
@@ -420,26 +375,9 @@ fn internal_variables_that_no_path_leads_to_are_refused() {
     for (name, make) in faults {
         let mut walker = Walker::new(joint(SAND), [-100.0, 0.0]);
         make(&mut walker.state);
-        let point = InterfacePoint {
-            jump: [0.0; 2],
-            jump_increment: [0.0; 2],
-            traction: walker.traction,
-            state: walker.state,
-            time: 0.0,
-            time_increment: 0.0,
-            step_time: 0.0,
-        };
-        let failure = walker.law.update(&point, Tangent::None).unwrap_err();
+        let failure = walker.respond([0.0; 2], Tangent::None).unwrap_err();
         assert!(failure.reason().starts_with(name), "{failure:?}");
     }
-}
-
-/// A linear congruential generator (Knuth's MMIX constants), uniform in [a, b).
-fn random(seed: &mut u64, a: f64, b: f64) -> f64 {
-    *seed = seed
-        .wrapping_mul(6_364_136_223_846_793_005)
-        .wrapping_add(1_442_695_040_888_963_407);
-    a + (b - a) * (*seed >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 /// Random interfaces and walks: admissible, the same in a mirror, and the tangent agrees with differences.
@@ -480,12 +418,13 @@ fn stays_admissible_with_an_exact_tangent_on_random_walks() {
             } else {
                 p.adhesion
             };
-            let tau_f = |w: &Walker| adhesion - w.traction[0] * tan(p.friction_angle);
+            let tau_f =
+                |w: &Walker<HyperbolicJoint>| adhesion - w.traction[0] * tan(p.friction_angle);
             assert!(walker.traction[0] <= 0.0);
             assert!(walker.traction[1].abs() <= tau_f(&walker) * (1.0 + 1e-14));
             assert!((0.0..=1.0).contains(&walker.state.stress_level));
             assert!(walker.state.gap == 0.0 || walker.traction == [0.0; 2]);
-            let zone = |w: &Walker| {
+            let zone = |w: &Walker<HyperbolicJoint>| {
                 if w.state.gap > 0.0 {
                     0
                 } else if w.state.stress_level >= 1.0
@@ -508,7 +447,7 @@ fn stays_admissible_with_an_exact_tangent_on_random_walks() {
                     end.step(moved);
                     end
                 });
-                let smooth = |w: &Walker| {
+                let smooth = |w: &Walker<HyperbolicJoint>| {
                     zone(w) == zone(&walker) && w.traction[1] * walker.traction[1] >= 0.0
                 };
                 // Close to σ_n = 0 powers of it have no Taylor series over the step.

@@ -1,19 +1,17 @@
-//! Unit tests of the mathematics: `zones` by hand, `reference` against an independent solution,
-//! `sweep` over random states, `tangent` against differences, `viscosity` against the exponential.
+//! Unit tests of the mathematics: `zones` by hand, `sweep` over random states, `tangent` against differences,
+//! `viscosity` against the exponential. All sets of active planes are tried in `tests/extremes`.
 #![expect(
     clippy::float_cmp,
     reason = "what must not change is compared bit for bit"
 )]
 
-mod reference;
 mod schemes;
 mod sweep;
 mod tangent;
 mod viscosity;
 mod zones;
 
-use crate::return_mapping::{Returned, Zone};
-use crate::surface::Pyramid;
+use crate::return_mapping::Zone;
 use crate::{MohrCoulomb, Parameters, State};
 use abi::substepping::SchemeParameters;
 use abi::{ContinuumLaw as _, SolidPoint, SolidResponse, Tangent};

@@ -27,9 +27,9 @@ normal = { mean = 30.0, deviation = 3.0, min = 20.0, max = 40.0 }
 fn slow() -> Place {
     let place = Place::new();
     let text = edited(&[
-        ("increments = 2", "increments = 60"),
-        ("increments = 2\ndis", "increments = 60\ndis"),
-        ("x = 1e-5", "x = 1e-3"),
+        "increments = 2 => increments = 60",
+        "increments = 2\ndis => increments = 60\ndis",
+        "x = 1e-5 => x = 1e-3",
     ]);
     place.write("case.toml", text);
     place.write("study.toml", SLOW);

@@ -234,14 +234,10 @@ fn an_accuracy_with_the_mesh_is_reached_on_a_finer_one() {
 fn the_error_of_a_mesh_that_no_finer_one_tells_is_not_known() {
     let place = Place::new();
     // The middle of an element is a point of the law, and none of four smaller ones.
-    let probe = "[probes]\nmiddle = { group = \"soil\", quantity = \"stress_22\", x = [0.499, 0.501], \
-                 y = [0.249, 0.251] }";
+    let probe = r#"[probes] => [probes]\nmiddle = { group = "soil", quantity = "stress_22", x = [0.499, 0.501], y = [0.249, 0.251] }"#;
     let text = edited(&[
-        (
-            "analysis",
-            "accuracy = 0.1\naccuracy_with_mesh = true\nanalysis",
-        ),
-        ("[probes]", probe),
+        "analysis => accuracy = 0.1\naccuracy_with_mesh = true\nanalysis",
+        probe,
     ]);
     let (outcome, chosen) = studied(&place, text);
     assert_eq!(chosen["verdict"], "not known", "{}", outcome.stderr);

@@ -2,6 +2,7 @@
 
 use super::routines::checked;
 use super::{DONE, PLUGIN_TROUBLE, place};
+use tests::words::has;
 
 const CHECK: &str = "routine-does-not-begin-again";
 
@@ -84,9 +85,6 @@ fn the_time_of_a_step_is_asked_for_where_the_time_counts() {
     let (checks, outcome) = checked(&place, "begins", &["--set", "what=2"]);
     let [found, details] = &checks[CHECK];
     assert_eq!(found, "warning", "{details}");
-    assert!(
-        details.contains("with TIME(1) = 0 in place of 1 STRESS ["),
-        "{details}"
-    );
+    has(&details, "with TIME(1) = 0 in place of 1 STRESS [");
     outcome.ended(DONE);
 }

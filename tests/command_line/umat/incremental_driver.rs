@@ -2,7 +2,9 @@
 
 use super::{number, place};
 use crate::program::{BAD_INPUT, NO_EQUILIBRIUM, Place};
+use std::collections::BTreeMap;
 use tests::case::table;
+use tests::tolerance::close;
 
 /// Input of the IncrementalDriver for a material with E = 2e4 and ν = 0.3.
 fn incremental(place: &Place, test: &str) {
@@ -15,6 +17,29 @@ fn incremental(place: &Place, test: &str) {
         "initialconditions.inp",
         "6\n-100.0d0\n-100.0\n-100.0\n0\n0\n0\n0\n",
     );
+}
+
+/// Rows of the test, led by a routine.
+fn led(place: &Place, library: &str) -> Vec<BTreeMap<String, String>> {
+    place.done(&["point", "test.inp", "--umat", library, "--csv", "out.csv"]);
+    table(&place.path("out.csv"))
+}
+
+/// What stresses and strains are measured by.
+fn scale(column: &str) -> f64 {
+    if column.starts_with("stress") {
+        100.0
+    } else {
+        1e-3
+    }
+}
+
+/// The change of a column between two rows.
+#[track_caller]
+fn changes(rows: &[BTreeMap<String, String>], from: usize, to: usize, what: &str, expected: f64) {
+    let found = number(&rows[to], what) - number(&rows[from], what);
+    let name = format!("{what} {from} to {to}");
+    close(name, found, expected, 1e-9 * scale(what));
 }
 
 #[test]
@@ -33,30 +58,10 @@ fn input_of_the_incremental_driver_is_followed() {
          *Repetition\n2 3\n*LinearLoad\n2 100 1.0\n*Rendulic\n1 5.0\n0 0\n0 0\n0 0\n0 0\n0 0\n\
          *PureCreep\n1 1 0.5\n*End\nwhatever follows\n",
     );
-    place.done(&[
-        "point",
-        "test.inp",
-        "--umat",
-        "libelastic.so",
-        "--csv",
-        "out.csv",
-    ]);
-    let rows = table(&place.path("out.csv"));
+    let rows = led(&place, "libelastic.so");
     assert_eq!(rows.len(), 1 + 6 * 4 + 3 * 2 + 8 + 3 * 3);
     let (g, lambda) = (2e4 / 2.6, 2e4 * 0.3 / (1.3 * 0.4));
-    // The change of a column between two rows.
-    let close = |from: usize, to: usize, what: &str, expected: f64| {
-        let found = number(&rows[to], what) - number(&rows[from], what);
-        let scale = if what.starts_with("stress") {
-            100.0
-        } else {
-            1e-3
-        };
-        assert!(
-            (found - expected).abs() < 1e-9 * scale,
-            "{what} {from} to {to}: {found} {expected}"
-        );
-    };
+    let close = |from, to, what, expected| changes(&rows, from, to, what, expected);
     close(0, 4, "stress_11", -(lambda + 2.0 * g) * 1e-3);
     close(0, 4, "stress_33", -lambda * 1e-3);
     close(4, 8, "strain_11", -20.0 / (lambda + 2.0 * g));
@@ -105,16 +110,7 @@ fn every_so_many_states_are_written() {
                  *Repetition\n1 2\n*TriaxialS1\n7 50 1.0{repeated}\n-5.0\n"
             ),
         );
-        let command = [
-            "point",
-            "test.inp",
-            "--umat",
-            "libelastic.so",
-            "--csv",
-            "out.csv",
-        ];
-        place.done(&command);
-        table(&place.path("out.csv"))
+        led(&place, "libelastic.so")
     };
     let all = run([""; 3]);
     assert_eq!(all.len(), 1 + 10 + 8 + 2 * 7);
@@ -149,29 +145,10 @@ fn restrictions_between_stress_and_strain_are_obeyed() {
          *Repetition\n1 2\n*ObeyRestrictions\n2 100 1.0\nsd1 - 2*sd2 = 0\nsd2 - sd3 = 0\n\
          sd1 = -10\nsd4 = 0\nsd5 = 0\nsd6 = 0\n",
     );
-    place.done(&[
-        "point",
-        "test.inp",
-        "--umat",
-        "libelastic.so",
-        "--csv",
-        "out.csv",
-    ]);
-    let rows = table(&place.path("out.csv"));
+    let rows = led(&place, "libelastic.so");
     assert_eq!(rows.len(), 1 + 4 + 4 + 2 * 2);
     let g = 2e4 / 2.6;
-    let close = |from: usize, to: usize, what: &str, expected: f64| {
-        let found = number(&rows[to], what) - number(&rows[from], what);
-        let scale = if what.starts_with("stress") {
-            100.0
-        } else {
-            1e-3
-        };
-        assert!(
-            (found - expected).abs() < 1e-9 * scale,
-            "{what} {from} to {to}: {found} {expected}"
-        );
-    };
+    let close = |from, to, what, expected| changes(&rows, from, to, what, expected);
     // No volume change: p is kept and the law isotropic.
     close(0, 4, "strain_22", 5e-4);
     close(0, 4, "strain_33", 5e-4);
@@ -206,9 +183,7 @@ fn restrictions_are_followed_where_a_law_flows() {
             "initialconditions.inp",
             "6\n-100\n-100\n-100\n0\n0\n0\n1\n0\n",
         );
-        let library = "libdrucker_prager.so";
-        place.done(&["point", "test.inp", "--umat", library, "--csv", "out.csv"]);
-        table(&place.path("out.csv"))
+        led(&place, "libdrucker_prager.so")
     };
     let restricted = run(
         "*ObeyRestrictions\n40 100 1.0\ned1 = -0.05\nsd2 = 0\nsd2 - sd3 = 0\nsd4 = 0\n\
@@ -219,15 +194,12 @@ fn restrictions_are_followed_where_a_law_flows() {
     for (restricted, led) in restricted.iter().zip(&led) {
         for column in ["stress_11", "stress_22", "strain_11", "strain_22"] {
             let (found, expected) = (number(restricted, column), number(led, column));
-            let scale = if column.starts_with("stress") {
+            let size = if column.starts_with("stress") {
                 100.0
             } else {
                 1e-2
             };
-            assert!(
-                (found - expected).abs() < 1e-8 * scale,
-                "{column}: {found} {expected}"
-            );
+            close(column, found, expected, 1e-8 * size);
         }
     }
     // Newton's method with the tangent of the routine.

@@ -4,6 +4,8 @@ use super::routines::checked;
 use super::{DONE, PLUGIN_TROUBLE, Place, place};
 use crate::program::Outcome;
 use std::collections::BTreeMap;
+use tests::words::has;
+use tests::words::words;
 
 type Checks = BTreeMap<String, [String; 2]>;
 
@@ -119,10 +121,7 @@ fn paths_that_never_yield_are_told_of() {
     outcome.ended(DONE);
     let [found, details] = &checks["paths-leave-elasticity"];
     assert_eq!(found, "warning", "{details}");
-    assert!(
-        details.contains("none of the increments leaves elasticity"),
-        "{details}"
-    );
+    has(&details, "none of the increments leaves elasticity");
 }
 
 /// Values that nothing speaks for are named, and are not where they are given.
@@ -133,21 +132,11 @@ fn parameters_without_a_ground_are_named() {
     };
     let path = place.path("planted.law.toml");
     std::fs::remove_file(&path).unwrap();
-    place.done(&[
-        "new-sidecar",
-        "libplanted.so",
-        "--nprops",
-        "5",
-        "--nstatv",
-        "1",
-    ]);
+    place.done(&words("new-sidecar libplanted.so --nprops 5 --nstatv 1"));
     let (checks, _) = checked(&place, "planted", &["--set", "prop_2=0.3"]);
     let [found, details] = &checks["sidecar-is-read"];
     assert_eq!(found, "warning", "{details}");
-    assert!(
-        details.contains("checked with `prop_1` = 1, `prop_3` = 1"),
-        "{details}"
-    );
+    has(&details, "checked with `prop_1` = 1, `prop_3` = 1");
     // What the guide leaves out of a sidecar is not asked for.
     let [found, details] = &checks["description-is-complete"];
     assert_eq!(found, "passed", "{details}");
@@ -172,14 +161,7 @@ fn a_parameter_that_the_sidecar_lacks_is_told() {
     };
     let path = place.path("planted.law.toml");
     std::fs::remove_file(&path).unwrap();
-    let arguments = [
-        "new-sidecar",
-        "libplanted.so",
-        "--nprops",
-        "3",
-        "--nstatv",
-        "1",
-    ];
+    let arguments = words("new-sidecar libplanted.so --nprops 3 --nstatv 1");
     place.done(&arguments);
     let all = ["prop_1=5e5", "prop_2=0.3", "prop_3=200"];
     let all: Vec<&str> = all.iter().flat_map(|set| ["--set", set]).collect();

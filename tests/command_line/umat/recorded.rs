@@ -3,6 +3,7 @@
 use super::{driver, number, place, recorded, rows, soil};
 use crate::program::{CASE, PLUGIN_TROUBLE};
 use tests::case::table;
+use tests::words::rows_of;
 
 #[test]
 fn a_call_can_be_recorded() {
@@ -68,15 +69,13 @@ fn the_option_records_a_call() {
         1,
     );
     place.write("two.toml", second);
-    for (command, file, says) in [
-        ("run", "native.toml", "no law of native.toml is a UMAT"),
-        (
-            "run",
-            "two.toml",
-            "soil, other are UMATs; give the key `record`",
-        ),
-        ("point", "own.toml", "law `elastic` is no UMAT"),
-    ] {
+    for [command, file, says] in rows_of(
+        "
+run | native.toml | no law of native.toml is a UMAT
+run | two.toml | soil, other are UMATs; give the key `record`
+point | own.toml | law `elastic` is no UMAT
+",
+    ) {
         place.write("none.toml", "an earlier one");
         let outcome = place.refused(&[command, file, "--record", "none.toml"]);
         outcome.shows(says);

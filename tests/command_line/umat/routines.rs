@@ -6,6 +6,8 @@ use super::{BAD_INPUT, DONE, PLUGIN_TROUBLE, Place, number, place, rows};
 use crate::program::Outcome;
 use serde_json::Value;
 use std::collections::BTreeMap;
+use tests::words::has;
+use tests::words::{rows_of, words};
 
 fn json(outcome: &Outcome) -> Value {
     serde_json::from_str(&outcome.stdout).unwrap()
@@ -50,10 +52,7 @@ fn who_supplies_what_a_routine_calls_is_said() {
     }
     // What Pilum is said to supply, it does: the routine runs.
     let remarks = found["remarks"].to_string();
-    assert!(
-        remarks.contains("with the sidecar utilities.law.toml"),
-        "{remarks}"
-    );
+    has(&remarks, "with the sidecar utilities.law.toml");
     // A law of the contract lacks nothing.
     let deps = std::env::current_exe()
         .unwrap()
@@ -132,49 +131,26 @@ fn what_a_sidecar_cannot_be_for_is_refused() {
         .unwrap()
         .join("libcoulomb_joint.so");
     let joint = deps.to_str().unwrap();
-    for (arguments, code, said) in [
-        (
-            vec!["libelastic.so", "--nprops", "2", "--ntens", "4,5"],
-            BAD_INPUT,
-            "--ntens 5: expected 2, 3, 4 or 6",
-        ),
-        (
-            vec!["libelastic.so", "--nprops", "many"],
-            BAD_INPUT,
-            "invalid value 'many'",
-        ),
-        (
-            vec!["libelastic.so", "--nprops", "20000"],
-            BAD_INPUT,
-            "20000 is not in 0..=10000",
-        ),
-        (vec!["libelastic.so"], BAD_INPUT, "--nprops"),
-        (
-            vec!["libelastic.so", "--nprops", "2", "--symbol", "sand_"],
-            PLUGIN_TROUBLE,
-            "has no routine sand_; it exports hooke_, umat_",
-        ),
-        (
-            vec!["libelsewhere.so", "--nprops", "2"],
-            BAD_INPUT,
-            "libelsewhere.so",
-        ),
-        (
-            vec!["libnothing.so", "--nprops", "2"],
-            PLUGIN_TROUBLE,
-            "libnothing.so is no library",
-        ),
-        (
-            vec![joint, "--nprops", "2"],
-            PLUGIN_TROUBLE,
-            "has no routine umat_, umat, UMAT, UMAT_",
-        ),
-    ] {
-        let mut all = vec!["new-sidecar"];
-        all.extend(arguments);
-        let outcome = place.run(&all);
-        assert_eq!(outcome.code, Some(code), "{all:?}: {}", outcome.stderr);
-        assert!(outcome.says(said), "{all:?}: {}", outcome.stderr);
+    for [arguments, code, said] in rows_of(&format!(
+        "
+libelastic.so --nprops 2 --ntens 4,5 | 1 | --ntens 5: expected 2, 3, 4 or 6
+libelastic.so --nprops many | 1 | invalid value 'many'
+libelastic.so --nprops 20000 | 1 | 20000 is not in 0..=10000
+libelastic.so | 1 | --nprops
+libelastic.so --nprops 2 --symbol sand_ | 3 | has no routine sand_; it exports hooke_, umat_
+libelsewhere.so --nprops 2 | 1 | libelsewhere.so
+libnothing.so --nprops 2 | 3 | libnothing.so is no library
+{joint} --nprops 2 | 3 | has no routine umat_, umat, UMAT, UMAT_
+"
+    )) {
+        let outcome = place.run(&words(&format!("new-sidecar {arguments}")));
+        assert_eq!(
+            outcome.code,
+            code.parse().ok(),
+            "{arguments}: {}",
+            outcome.stderr
+        );
+        assert!(outcome.says(said), "{arguments}: {}", outcome.stderr);
     }
     assert_eq!(place.contents(), ["libelastic.so", "libnothing.so"]);
 }
@@ -246,77 +222,25 @@ pub(super) fn checked(
 /// Routines that do what their sidecars say: nothing fails, and nothing is warned of.
 #[test]
 fn sound_routines_pass_every_check() {
-    for (name, more) in [
-        ("elastic", &["--set", "young_modulus=1e4"][..]),
-        ("maxwell", &[]),
-        (
-            "joint",
-            &[
-                "--set",
-                "friction=0.6",
-                "--set",
-                "shear_stiffness=1e4",
-                "--set",
-                "normal_stiffness=1e5",
-            ],
-        ),
-        (
-            "joint_3d",
-            &[
-                "--set",
-                "friction=0.6",
-                "--set",
-                "shear_stiffness=1e4",
-                "--set",
-                "normal_stiffness=1e5",
-            ],
-        ),
-        (
-            "drucker_prager",
-            &[
-                "--set",
-                "young_modulus=1e4",
-                "--set",
-                "alpha=0.3",
-                "--set",
-                "beta=0.05",
-                "--set",
-                "k=4",
-            ],
-        ),
-        (
-            "elastic_tangent",
-            &[
-                "--set",
-                "young_modulus=1e4",
-                "--set",
-                "alpha=0.3",
-                "--set",
-                "beta=0.05",
-                "--set",
-                "k=4",
-            ],
-        ),
-        (
-            "mohr_coulomb",
-            &[
-                "--set",
-                "young_modulus=1e4",
-                "--set",
-                "cohesion=5",
-                "--set",
-                "friction_angle=30",
-                "--set",
-                "dilatancy_angle=5",
-            ],
-        ),
-        ("rows", &["--set", "stiffness=1", "--set", "coupling=1"]),
-        ("doubtful", &[]),
-    ] {
+    for [name, settings] in rows_of(
+        "
+elastic | young_modulus=1e4
+maxwell | -
+joint | friction=0.6 shear_stiffness=1e4 normal_stiffness=1e5
+joint_3d | friction=0.6 shear_stiffness=1e4 normal_stiffness=1e5
+drucker_prager | young_modulus=1e4 alpha=0.3 beta=0.05 k=4
+elastic_tangent | young_modulus=1e4 alpha=0.3 beta=0.05 k=4
+mohr_coulomb | young_modulus=1e4 cohesion=5 friction_angle=30 dilatancy_angle=5
+rows | stiffness=1 coupling=1
+doubtful | -
+",
+    ) {
+        let more = words(settings).into_iter().filter(|set| *set != "-");
+        let more: Vec<&str> = more.flat_map(|set| ["--set", set]).collect();
         let Some(place) = place(name) else {
             return;
         };
-        let (checks, outcome) = checked(&place, name, more);
+        let (checks, outcome) = checked(&place, name, &more);
         assert_eq!(outcome.code, Some(DONE), "{name}: {}", outcome.stderr);
         assert!(checks.len() >= 12, "{name}: {checks:?}");
         for (id, [found, details]) in &checks {

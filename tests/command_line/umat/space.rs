@@ -2,6 +2,7 @@
 
 use super::{DONE, Place, number, place, rows};
 use std::collections::BTreeMap;
+use tests::tolerance::close;
 use tests::tolerance::near;
 
 fn driver(hypothesis: &str, segments: &str) -> String {
@@ -53,10 +54,7 @@ fn three_components_come_normal_first() {
         ("ntens", 3.0),
     ] {
         let found = number(end, column);
-        assert!(
-            (found - expected).abs() < 1e-9 * expected.abs(),
-            "{column}: {found} {expected}"
-        );
+        close(column, found, expected, 1e-9 * expected.abs());
     }
     // Its own tangent: what is led by tractions converges at once.
     let creeping = "[[segment]]\nincrements = 10\n\
@@ -85,10 +83,7 @@ fn space_gives_what_the_plane_gives() {
         let shear = number(plane, "traction_t");
         let near = |row: &BTreeMap<String, String>, column: &str, expected: f64| {
             let found = number(row, column);
-            assert!(
-                (found - expected).abs() < 1e-9,
-                "{column}: {found} {expected}"
-            );
+            close(column, found, expected, 1e-9);
         };
         near(along, "traction_t", shear);
         near(along, "traction_s", 0.0);

@@ -9,7 +9,9 @@
 use super::{gfortran, number, place, source};
 use crate::program::{DONE, Outcome, Place};
 use tests::case::table;
+use tests::tolerance::close;
 use tests::tolerance::near;
+use tests::words::words;
 
 /// What the solver leaves of a load, next to tolerances of 1e-9 and 1e-7.
 const SAME: f64 = 1e-6;
@@ -184,10 +186,7 @@ fn a_mohr_coulomb_routine_with_a_wrong_tangent_is_noticed_and_gives_the_same_loa
         let (iterations, load) = done(&place, &outcome);
         println!("{what}: {iterations} iterations, {load:.9} kN");
         assert!(outcome.says(NOTICED), "{what}: {}", outcome.stderr);
-        assert!(
-            (load - expected).abs() <= SAME * expected,
-            "{what}: {load} {expected}"
-        );
+        close(what, load, expected, SAME * expected);
         assert!(2 * iterations < 3 * few, "{what}: {iterations} {few}");
     }
 }
@@ -222,15 +221,7 @@ fn a_run_that_is_stopped_before_or_after_the_notice_goes_on_to_the_same_bits() {
     let expected = read("out/history.csv");
     for seconds in ["0.05", "0.15", "0.4"] {
         let _ = std::fs::remove_dir_all(place.path("stopped"));
-        let run = [
-            "run",
-            "case.toml",
-            "--out",
-            "stopped",
-            "--checkpoint",
-            "0",
-            "--resume",
-        ];
+        let run = words("run case.toml --out stopped --checkpoint 0 --resume");
         let mut child = place.start(&run);
         std::thread::sleep(std::time::Duration::from_secs_f64(seconds.parse().unwrap()));
         child.kill().unwrap();

@@ -4,10 +4,12 @@
 //! for T in n increments leaves σ₀ (1 + T/(n τ))⁻ⁿ, which tends to σ₀ e^(−T/τ).
 
 use super::{Place, number, place, rows, soil};
-use crate::program::{Edit, edited};
+use crate::program::edited;
 use std::time::{Duration, Instant};
 use tests::case::table;
+use tests::tolerance::close;
 use tests::tolerance::near;
+use tests::words::rows_of;
 
 const TAU: f64 = 1000.0;
 
@@ -63,10 +65,7 @@ fn a_stress_that_is_held_creeps_in_proportion_to_the_time() {
         let stress = number(start, "stress_22");
         let creep = number(end, "strain_22") - number(start, "strain_22");
         let expected = stress / 2e4 * 2500.0 / TAU;
-        assert!(
-            (creep - expected).abs() < 1e-9 * expected.abs(),
-            "{n}: {creep} {expected}"
-        );
+        close(n, creep, expected, 1e-9 * expected.abs());
     }
 }
 
@@ -94,10 +93,7 @@ fn time_and_dtime_are_those_of_the_segment() {
         let columns = ["time", "step_time", "total_time", "dtime"];
         for (column, expected) in columns.into_iter().zip(expected) {
             let found = number(row, column);
-            assert!(
-                (found - expected).abs() < 1e-9,
-                "{column}: {found} {expected}"
-            );
+            close(column, found, expected, 1e-9);
         }
     }
     let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
@@ -133,34 +129,19 @@ fn steps_of_an_increment_share_its_time() {
 
 /// The block without its layer, its top pushed down in 2 s and held for 3000 s.
 fn held(parameters: &str, phase: &str) -> String {
-    let push: &[Edit] = &[
-        ("[[mesh.region]]\ngroup = \"layer\"\nx = [1.0, 1.01]\n", ""),
-        (
-            "[groups.layer]\nformulation = \"thin_layer\"\nlaw = \"joint\"\n",
-            "",
-        ),
-        (
-            "[probes]\n",
-            "[probes]\nstress = { group = \"soil\", quantity = \"stress_22\" }\n\
-          passed = { group = \"soil\", quantity = \"passed\", reduce = \"max\" }\n\
-          step_time = { group = \"soil\", quantity = \"step_time\" }\n\
-          total_time = { group = \"soil\", quantity = \"total_time\" }\n\
-          dtime = { group = \"soil\", quantity = \"dtime\" }\n",
-        ),
-        (
-            "tau = { group = \"layer\", quantity = \"traction_t\" }\nhalf = { combine = { tau = 0.5 } }\n",
-            "",
-        ),
-        (
-            "[[supports]]\nline = \"bottom\"\nfixed = [\"x\", \"y\"]\n",
-            "[[supports]]\nline = \"bottom\"\nfixed = [\"y\"]\n[[supports]]\nline = \"left\"\nfixed = [\"x\"]\n\
-          [[supports]]\nline = \"right\"\nfixed = [\"x\"]\n",
-        ),
+    let push: &[&str] = &[
+        r#"[[mesh.region]]\ngroup = "layer"\nx = [1.0, 1.01]\n => "#,
+        r#"[groups.layer]\nformulation = "thin_layer"\nlaw = "joint"\n => "#,
+        "[probes]\n => [probes]\nstress = { group = \"soil\", quantity = \"stress_22\" }\n\
+            passed = { group = \"soil\", quantity = \"passed\", reduce = \"max\" }\n\
+            step_time = { group = \"soil\", quantity = \"step_time\" }\ntotal_time = { group = \"soil\", \
+            quantity = \"total_time\" }\ndtime = { group = \"soil\", quantity = \"dtime\" }\n",
+        r#"tau = { group = "layer", quantity = "traction_t" }\nhalf = { combine = { tau = 0.5 } }\n => "#,
+        "[[supports]]\nline = \"bottom\"\nfixed = [\"x\", \"y\"]\n => [[supports]]\n\
+            line = \"bottom\"\nfixed = [\"y\"]\n[[supports]]\nline = \"left\"\n\
+            fixed = [\"x\"]\n[[supports]]\nline = \"right\"\nfixed = [\"x\"]\n",
     ];
-    let text = push.iter().fold(edited(&[]), |text, (from, to)| {
-        assert!(text.contains(from), "{from}");
-        text.replacen(from, to, 1)
-    });
+    let text = edited(push);
     let (head, rest) = text.split_once("[[phase]]").unwrap();
     let probes = rest.split_once("[probes]").unwrap().1;
     let joint = head.find("[laws.joint]").unwrap();
@@ -201,10 +182,7 @@ fn a_phase_gives_its_time_to_its_increments() {
     let rows = table(&place.path("out/history.csv"));
     assert_eq!(rows.len(), 10);
     let near = |found: f64, expected: f64, what: &str| {
-        assert!(
-            (found - expected).abs() <= 1e-8 * expected.abs().max(1e-3),
-            "{what}: {found} {expected}"
-        );
+        close(what, found, expected, 1e-8 * expected.abs().max(1e-3));
     };
     for (k, row) in rows[..4].iter().enumerate() {
         let start = 0.5 * k as f64;
@@ -304,19 +282,15 @@ fn times_that_cannot_be_are_refused_at_their_place() {
     let Some(place) = place("maxwell") else {
         return;
     };
-    for (time, said) in [
-        ("0.0", "`time` is 0, expected above 0"),
-        ("-3.0", "`time` is -3, expected above 0"),
-        ("nan", "`time`: nan is no finite number"),
-        (
-            "1e21",
-            "`time` is 1000000000000000000000, expected above 0 and at most 1e20",
-        ),
-        (
-            "\"1 h\"",
-            "`time`: found the text \"1 h\", expected a number",
-        ),
-    ] {
+    for [time, said] in rows_of(
+        r#"
+0.0 | `time` is 0, expected above 0
+-3.0 | `time` is -3, expected above 0
+nan | `time`: nan is no finite number
+1e21 | `time` is 1000000000000000000000, expected above 0 and at most 1e20
+"1 h" | `time`: found the text "1 h", expected a number
+"#,
+    ) {
         place.write(
             "driver.toml",
             driver(&format!("increments = 2\ntime = {time}\ncontrol = {{}}")),

@@ -1,12 +1,13 @@
 //! Routines that are right and were refused: with their own habits, with much to say, with calls
 //! that are never reached, with tangents by rows or of elasticity.
 
-use super::{driver, gfortran, number, place, rows, soil, source};
+use super::{driver, gfortran, number, place, rows, source};
 use crate::program::{BAD_INPUT, DONE, NO_EQUILIBRIUM, Outcome, PLUGIN_TROUBLE, Place};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::process::Command;
 use tests::case::table;
+use tests::words::rows_of;
 
 /// Runs a driver without looking at how it ends.
 fn point(place: &Place, text: &str) -> Outcome {
@@ -49,11 +50,7 @@ fn copies_may_be_used_up_and_that_is_noted_once() {
         assert_eq!(stress(what).0, neat, "what it leaves there is not used");
     }
     // A run says it, too, and keeps it.
-    let case = soil("habits", "").replacen(
-        "poisson_ratio = 0.3 }",
-        "poisson_ratio = 0.3, what = 1 }",
-        1,
-    );
+    let case = super::soil_with("habits", "what = 1");
     let outcome = place.done_case(case);
     let warnings = place.summary()["warnings"].to_string();
     assert_eq!(
@@ -72,11 +69,7 @@ fn time_increments_are_positive_in_every_call() {
     // The first call of all, in which nothing moves, is checked too: 0/0 would be refused.
     let all = rows(&place, &driver("habits", "", "what = 3"));
     assert!(all[1..].iter().all(|row| number(row, "dtime") == 1.0));
-    let text = soil("habits", "").replacen(
-        "poisson_ratio = 0.3 }",
-        "poisson_ratio = 0.3, what = 3 }",
-        1,
-    );
+    let text = super::soil_with("habits", "what = 3");
     // The elastic operator is asked for, and is that of a call without strain.
     for method in ["newton", "initial_stress"] {
         let text = text.replacen("[solver]", &format!("[solver]\nmethod = \"{method}\""), 1);
@@ -122,11 +115,7 @@ fn what_is_printed_is_passed_on_and_counted() {
         "{total}"
     );
 
-    let case = soil("talks", "").replacen(
-        "poisson_ratio = 0.3 }",
-        "poisson_ratio = 0.3, lines = 1 }",
-        1,
-    );
+    let case = super::soil_with("talks", "lines = 1");
     let outcome = place.done_case(case);
     assert_eq!(lines(&outcome.stderr, "umat_talks` prints: ").len(), 20);
     assert!(!outcome.stdout.contains("LINE"), "{}", outcome.stdout);
@@ -179,20 +168,13 @@ fn scratch_files_are_removed_or_kept() {
     std::fs::remove_dir_all(&left()[0]).unwrap();
     run("scratch = \"remove\"");
     assert_eq!(left(), Vec::<PathBuf>::new());
-    for (keys, says) in [
-        (
-            "in_process = true\nscratch = \"keep\"",
-            "`scratch` needs a worker process",
-        ),
-        (
-            "in_process = true\nexternals = \"trap\"",
-            "`externals` needs a worker process",
-        ),
-        (
-            "externals = \"ignore\"",
-            "`externals`: there is no `ignore`",
-        ),
-    ] {
+    for [keys, says] in rows_of(
+        r#"
+in_process = true\nscratch = "keep" | `scratch` needs a worker process
+in_process = true\nexternals = "trap" | `externals` needs a worker process
+externals = "ignore" | `externals`: there is no `ignore`
+"#,
+    ) {
         let outcome = point(&place, &driver("talks", keys, "lines = 0")).ended(BAD_INPUT);
         outcome.shows(says);
     }
@@ -297,24 +279,8 @@ fn a_tangent_may_stand_row_by_row() {
 
 /// The cone with elastic tangents, in a soil that flows.
 fn flowing(place: &Place, method: &str) -> Outcome {
-    let text = soil("elastic_tangent", "")
-        .replacen(
-            "parameters = { young_modulus = 1e4, poisson_ratio = 0.3 }",
-            "parameters = { young_modulus = 1e4, alpha = 0.3, beta = 0.05, k = 4.0 }",
-            1,
-        )
-        .replacen(
-            "cohesion = 10.0\n",
-            "cohesion = 1000.0\ntensile_strength = 1000.0\n",
-            1,
-        )
-        .replacen("x = 1e-5 }", "x = 3e-3 }", 1)
-        .replacen(
-            "name = \"push\"\nincrements = 2",
-            "name = \"push\"\nincrements = 10",
-            1,
-        )
-        .replacen("max_iterations = 20", method, 1);
+    let text = super::flowing("elastic_tangent");
+    let text = text.replacen("max_iterations = 20", method, 1);
     place.run_case(text)
 }
 

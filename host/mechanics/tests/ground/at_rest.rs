@@ -1,93 +1,11 @@
 //! Ground at rest stays.
 
 use super::{
-    E, NU, SHAPES, Shape, elastic, grid, held, k_0, largest, roller_box, run, solid, straighten,
+    E, NU, SHAPES, Shape, elastic, grid, held, k_0, largest, pressed, roller_box, run, solid,
+    straighten,
 };
-use mechanics::problem::{
-    Analysis, AtRest, Axis, InitialStress, Integration, Phase, Pressure, Profile, Ratio, Water,
-};
+use mechanics::problem::{Analysis, AtRest, Axis, InitialStress, Phase, Profile, Ratio, Water};
 use mechanics::{Problem, Simulation};
-
-/// Two layers, with water in the middle of an element or none: nothing moves, stresses are those by hand.
-#[test]
-fn level_ground_at_rest_stays() {
-    for analysis in [Analysis::PlaneStrain, Analysis::Axisymmetric] {
-        for shape in SHAPES {
-            for integration in [None, Some(Integration::Full), Some(Integration::BBar)] {
-                for level in [None, Some(3.0), Some(2.6), Some(7.0)] {
-                    let x = [0.0, 0.7, 1.5, 3.0];
-                    let mesh = grid(
-                        &x,
-                        &[0.0, 1.2, 2.0, 3.0, 4.0],
-                        |_, row| usize::from(row > 1),
-                        shape,
-                    );
-                    let mut problem = Problem::new(analysis, mesh);
-                    let mut lower = solid("lower", elastic(analysis, E, NU));
-                    (lower.unit_weight, lower.saturated_unit_weight) = (18.0, Some(18.0));
-                    let mut upper = solid("upper", elastic(analysis, 0.3 * E, 0.2));
-                    (upper.unit_weight, upper.saturated_unit_weight) = (16.0, Some(20.0));
-                    lower.initial_stress = Some(k_0(0.5));
-                    upper.initial_stress = Some(k_0(0.9));
-                    problem.groups = vec![lower, upper];
-                    for group in &mut problem.groups {
-                        group.integration = integration;
-                    }
-                    problem.water = level.map(|level| Water {
-                        level: level.into(),
-                        unit_weight: 10.0,
-                    });
-                    problem.supports = roller_box();
-                    problem.phases = vec![Phase::new("rest", 1)];
-                    let at = format!("{analysis:?} {shape:?} {integration:?} {level:?}");
-                    let simulation = run(problem);
-                    let moved = largest(simulation.snapshot().displacement);
-                    // 80 kPa over 4 m of the stiffness move the top by 12 mm.
-                    // Where water stands within skewed elements, K_0 σ'_h bends in them.
-                    let is_bent = level == Some(2.6) && shape != Shape::Rectangles;
-                    let most = if is_bent { 2e-4 } else { 1e-13 };
-                    assert!(moved < most, "{at}: {moved}");
-                    let total: f64 = match analysis {
-                        Analysis::PlaneStrain => 3.0,
-                        Analysis::Axisymmetric => 9.0 * std::f64::consts::PI,
-                    };
-                    let table = level.unwrap_or(-1.0);
-                    let wet = (table - 2.0).clamp(0.0, 2.0);
-                    let weight = 36.0 + 16.0 * (2.0 - wet) + 20.0 * wet;
-                    // The lake's water stands on the top, which is free.
-                    let lake = (table - 4.0).max(0.0) * 10.0;
-                    let reaction = simulation.reaction_of("bottom").unwrap()[1];
-                    assert!(
-                        (reaction / (total * (weight + lake)) - 1.0).abs() < 1e-12,
-                        "{at}: {reaction}"
-                    );
-                    for group in simulation.groups() {
-                        let (k_0, is_upper) = if group.name == "upper" {
-                            (0.9, true)
-                        } else {
-                            (0.5, false)
-                        };
-                        for point in 0..group.kinematics.n_points() {
-                            let [_, y] = group.kinematics.position(point);
-                            let wet = (table.min(4.0) - y.max(2.0)).clamp(0.0, 2.0);
-                            let dry = 4.0 - y.max(2.0) - wet;
-                            let below = if is_upper { 0.0 } else { 18.0 * (2.0 - y) };
-                            let pore = (table - y).max(0.0) * 10.0;
-                            let v = below + 16.0 * dry + 20.0 * wet + lake - pore;
-                            let stress = group.global_stress(point).unwrap();
-                            let close =
-                                |a: f64, b: f64| (a - b).abs() < if is_bent { 2.0 } else { 1e-9 };
-                            assert!(
-                                close(stress[1], -v) && close(stress[0], -k_0 * v),
-                                "{at}: {stress:?} {v}"
-                            );
-                        }
-                    }
-                }
-            }
-        }
-    }
-}
 
 /// A surcharge on the top of three layers is carried down, that of a group itself wins, and under the load that it
 /// represents nothing moves.
@@ -119,10 +37,7 @@ fn a_surcharge_is_carried_down_and_at_rest() {
         problem.groups = groups.collect();
         problem.supports = roller_box();
         let mut phase = Phase::new("rest", 1);
-        phase.pressure = vec![Pressure {
-            line: "top".to_owned(),
-            value: KPA.into(),
-        }];
+        phase.pressure = pressed("top", KPA);
         problem.phases = vec![phase];
         problem
     };
@@ -209,33 +124,6 @@ fn a_surcharge_is_carried_down_its_own_vertical() {
             let v = 20.0 * (2.0 - y) + if x > 2.0 { 30.0 } else { 0.0 };
             let found = group.global_stress(point).unwrap()[1];
             assert!((found + v).abs() < 1e-12, "{x} {y}: {found} {v}");
-        }
-    }
-}
-
-/// Sides that are curved: the stress at rest is linear in the coordinates there as well.
-#[test]
-fn level_ground_of_curved_elements_stays() {
-    for analysis in [Analysis::PlaneStrain, Analysis::Axisymmetric] {
-        for shape in [Shape::Curved, Shape::CurvedTriangles] {
-            for level in [None, Some(2.0), Some(6.0)] {
-                let x = [0.0, 1.0, 2.0, 3.0];
-                let mesh = grid(&x, &[0.0, 1.0, 2.0, 3.0], |_, _| 0, shape);
-                let mut problem = Problem::new(analysis, mesh);
-                let mut ground = solid("ground", elastic(analysis, E, NU));
-                (ground.unit_weight, ground.saturated_unit_weight) = (18.0, Some(20.0));
-                ground.initial_stress = Some(k_0(0.5));
-                problem.groups = vec![ground];
-                problem.water = level.map(|level| Water {
-                    level: level.into(),
-                    unit_weight: 10.0,
-                });
-                problem.supports = roller_box();
-                problem.phases = vec![Phase::new("rest", 1)];
-                let moved = largest(run(problem).snapshot().displacement);
-                // 60 kPa over 3 m of the stiffness move the top by 7 mm.
-                assert!(moved < 1e-13, "{analysis:?} {shape:?} {level:?}: {moved}");
-            }
         }
     }
 }

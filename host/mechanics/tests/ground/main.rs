@@ -2,26 +2,19 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests panic to fail")]
 
 mod at_rest;
+#[path = "../common/mod.rs"]
+mod common;
 mod interfaces;
 mod undrained;
 
-use law::{Hypothesis, SearchPath};
+use common::{cut, held, insert_joints, joint, material, name, name_sides, pressed};
+use law::Hypothesis;
 use mechanics::check::Cause;
-use mechanics::mesh::{Along, Solid};
 use mechanics::problem::{
     Analysis, AtRest, Axis, Displacement, Drainage, ElementGroup, Force, Formulation, Free,
-    InitialStress, Phase, Pressure, Profile, Ratio, Support, Variation, Water,
+    InitialStress, Phase, Profile, Ratio, Support, Water,
 };
 use mechanics::{Error, Material, Mesh, Problem, Simulation};
-
-fn material(id: &str, hypothesis: Hypothesis, values: &[(&str, f64)]) -> Material {
-    let target = std::env::current_exe().unwrap();
-    let deps = target.parent().unwrap().to_owned();
-    let search = SearchPath::new(&[deps.clone(), deps.parent().unwrap().to_owned()]);
-    let values: Vec<_> = values.iter().map(|&(id, v)| (id, v.into())).collect();
-    let law = search.law(id).unwrap().with(hypothesis, &values).unwrap();
-    Material::new(id, law)
-}
 
 const E: f64 = 2e4;
 const NU: f64 = 0.3;
@@ -31,22 +24,7 @@ fn elastic(analysis: Analysis, e: f64, nu: f64) -> Material {
         Analysis::Axisymmetric => Hypothesis::Axisymmetric,
         Analysis::PlaneStrain => Hypothesis::PlaneStrain,
     };
-    material(
-        "elastic",
-        hypothesis,
-        &[("young_modulus", e), ("poisson_ratio", nu)],
-    )
-}
-
-fn joint(k: f64) -> Material {
-    let values = [
-        ("normal_stiffness", k),
-        ("shear_stiffness", k),
-        ("cohesion", 1e6),
-        ("friction_angle", 30.0),
-        ("dilatancy_angle", 0.0),
-    ];
-    material("coulomb_joint", Hypothesis::Interface2d, &values)
+    common::elastic(hypothesis, e, nu)
 }
 
 fn oedometric(e: f64, nu: f64) -> f64 {
@@ -64,7 +42,7 @@ fn k_0(value: f64) -> InitialStress {
 /// no rectangles.
 fn grid(x: &[f64], y: &[f64], group: impl Fn(usize, usize) -> usize, shape: Shape) -> Mesh {
     let mut mesh = Mesh::grid(x, y, group);
-    if shape != Shape::Rectangles && shape != Shape::Cut {
+    if !matches!(shape, Shape::Rectangles | Shape::Cut) {
         let (left, right) = (x[0], x[x.len() - 1]);
         for node in &mut mesh.nodes {
             let t = (node[0] - left) / (right - left);
@@ -74,37 +52,14 @@ fn grid(x: &[f64], y: &[f64], group: impl Fn(usize, usize) -> usize, shape: Shap
                 * 4.0
                 * (3.0 * node[1]).sin();
         }
-        if !matches!(shape, Shape::Curved | Shape::CurvedTriangles) {
-            straighten(&mut mesh);
-        }
+        straighten(&mut mesh);
     }
-    if matches!(
-        shape,
-        Shape::Triangles | Shape::Cut | Shape::CurvedTriangles
-    ) {
-        triangles(&mut mesh, |_| true);
-    } else if shape == Shape::Mixed {
-        triangles(&mut mesh, |number| number % 3 == 0);
-    }
-    let extent = |c: usize| {
-        let at = mesh.nodes.iter().map(|node| node[c]);
-        [
-            at.clone().fold(f64::INFINITY, f64::min),
-            at.fold(f64::NEG_INFINITY, f64::max),
-        ]
-    };
-    let ([left, right], [low, high]) = (extent(0), extent(1));
-    let sides = [
-        ("left", 0, left),
-        ("right", 0, right),
-        ("bottom", 1, low),
-        ("top", 1, high),
-    ];
-    for (name, c, at) in sides {
-        mesh.name_line(name, |edge| {
-            edge.iter().all(|node| (node[c] - at).abs() < 1e-9)
-        });
-    }
+    cut(&mut mesh, |number| match shape {
+        Shape::Triangles | Shape::Cut => Some(true),
+        Shape::Mixed if number % 3 == 0 => Some(true),
+        _ => None,
+    });
+    name_sides(&mut mesh);
     mesh
 }
 
@@ -126,9 +81,6 @@ enum Shape {
     Mixed,
     /// Rectangles, each cut into two triangles.
     Cut,
-    /// Sides along waves.
-    Curved,
-    CurvedTriangles,
 }
 
 const SHAPES: [Shape; 4] = [
@@ -137,31 +89,6 @@ const SHAPES: [Shape; 4] = [
     Shape::Triangles,
     Shape::Mixed,
 ];
-
-fn triangles(mesh: &mut Mesh, is_cut: impl Fn(usize) -> bool) {
-    let quads = std::mem::take(&mut mesh.solids);
-    for (number, quad) in quads.into_iter().enumerate() {
-        if !is_cut(number) {
-            mesh.solids.push(quad);
-            continue;
-        }
-        let [a, b, c, d, ab, bc, cd, da] = quad.nodes().try_into().unwrap();
-        let middle = mesh.nodes.len();
-        let ends = [a, c].map(|node| mesh.nodes[node]);
-        mesh.nodes
-            .push([0, 1].map(|i| f64::midpoint(ends[0][i], ends[1][i])));
-        let halves = [[a, b, c, ab, bc, middle], [a, c, d, middle, cd, da]];
-        mesh.solids
-            .extend(halves.map(|nodes| Solid::triangle(nodes, quad.group)));
-    }
-}
-
-fn held(line: &str, fixed: &[Axis]) -> Support {
-    Support {
-        line: line.to_owned(),
-        fixed: fixed.to_vec(),
-    }
-}
 
 fn roller_box() -> Vec<Support> {
     vec![
@@ -183,62 +110,6 @@ fn run(problem: Problem) -> Simulation {
     let mut simulation = Simulation::new(problem).unwrap();
     simulation.run(&mut ()).unwrap();
     simulation
-}
-
-/// Excavation over a column: heave γ h H/E_oed; put back without stress: the same down again.
-#[test]
-fn an_excavation_heaves_by_what_it_weighed() {
-    for analysis in [Analysis::PlaneStrain, Analysis::Axisymmetric] {
-        for shape in SHAPES {
-            let mesh = grid(
-                &[0.0, 0.5, 1.0],
-                &[0.0, 2.0, 4.0, 5.0, 6.0],
-                |_, row| usize::from(row > 1),
-                shape,
-            );
-            let mut problem = Problem::new(analysis, mesh);
-            let mut groups = vec![
-                solid("below", elastic(analysis, E, NU)),
-                solid("dug", elastic(analysis, E, NU)),
-            ];
-            for group in &mut groups {
-                group.unit_weight = 20.0;
-                group.initial_stress = Some(k_0(0.5));
-            }
-            problem.groups = groups;
-            problem.mesh.name_line("floor", |edge| {
-                edge.iter().all(|node| (node[1] - 4.0).abs() < 1e-9)
-            });
-            problem.supports = roller_box();
-            let mut dig = Phase::new("dig", 2);
-            dig.deactivate = vec![1];
-            let mut fill = Phase::new("fill", 2);
-            fill.activate = vec![1];
-            problem.phases = vec![Phase::new("rest", 1), dig, fill];
-            let mut simulation = Simulation::new(problem).unwrap();
-            for _ in 0..3 {
-                simulation.step().unwrap();
-            }
-            let heave = 20.0 * 2.0 * 4.0 / oedometric(E, NU);
-            let up = simulation.displacement_of("floor").unwrap()[1];
-            assert!(
-                (up / heave - 1.0).abs() < 1e-9,
-                "{analysis:?} {shape:?}: {up} {heave}"
-            );
-            simulation.run(&mut ()).unwrap();
-            let back = simulation.displacement_of("floor").unwrap()[1];
-            // Mean strains weighted with the radius are not quite those at the points.
-            let has_mean = analysis == Analysis::Axisymmetric && shape != Shape::Rectangles;
-            let least = if has_mean { 2e-4 } else { 1e-9 };
-            assert!(
-                back.abs() < least * heave,
-                "{analysis:?} {shape:?}: {back} of {heave}"
-            );
-            let fill = &simulation.groups()[1];
-            let lowest = (0..fill.kinematics.n_points()).map(|p| fill.global_stress(p).unwrap()[1]);
-            assert!(lowest.fold(0.0, f64::min) < -30.0);
-        }
-    }
 }
 
 /// With ν_u not above ν of the law the water has no stiffness; earth pressure at rest cannot be tension. Both are
@@ -338,16 +209,9 @@ fn no_equilibrium_beside_ground_that_is_gone() {
         |_, j| j,
         Shape::Rectangles,
     );
-    for (name, y) in [("foot", 1.0), ("head", 2.0)] {
-        mesh.name_line(name, |e| e.iter().all(|n| (n[1] - y).abs() < 1e-9));
-    }
-    let along = |line: &str, group| Along {
-        line: line.to_owned(),
-        group,
-        opens_ends: true,
-    };
-    mesh.insert_joints(&[along("foot", 3), along("head", 4)])
-        .unwrap();
+    name(&mut mesh, "foot", 1, 1.0);
+    name(&mut mesh, "head", 1, 2.0);
+    insert_joints(&mut mesh, &[("foot", 3), ("head", 4)]);
     let mut problem = Problem::new(analysis, mesh);
     for name in ["lower", "middle", "upper"] {
         let mut group = solid(name, elastic(analysis, E, NU));
@@ -355,20 +219,16 @@ fn no_equilibrium_beside_ground_that_is_gone() {
         group.initial_stress = Some(k_0(0.0));
         problem.groups.push(group);
     }
-    let values = [
-        ("normal_stiffness", 1e5),
-        ("shear_stiffness", 1e5),
-        ("cohesion", 0.0),
-        ("friction_angle", 30.0),
-        ("dilatancy_angle", 0.0),
-    ];
     for name in ["foot", "head"] {
-        let law = material("coulomb_joint", Hypothesis::Interface2d, &values);
+        let law = joint([1e5; 2], 0.0, 30.0);
         problem
             .groups
             .push(ElementGroup::new(name, Formulation::ZeroThickness, law));
     }
-    mesh_side(&mut problem);
+    problem.mesh.name_line("side", |e| {
+        e.iter()
+            .all(|n| n[0].abs() < 1e-9 && (0.99..=2.01).contains(&n[1]))
+    });
     problem.supports = vec![held("bottom", &[Axis::X, Axis::Y])];
     let mut dig = Phase::new("dig", 2);
     dig.deactivate = vec![2, 4];
@@ -383,21 +243,13 @@ fn no_equilibrium_beside_ground_that_is_gone() {
     assert!(error.contains("dig"), "{error}");
 }
 
-/// Names the left side of the middle block.
-fn mesh_side(problem: &mut Problem) {
-    problem.mesh.name_line("side", |e| {
-        e.iter()
-            .all(|n| n[0].abs() < 1e-9 && (0.99..=2.01).contains(&n[1]))
-    });
-}
-
 /// A pressure on the floor of a pit, and on ground upon which more will come.
 #[test]
 fn a_pressure_acts_on_a_surface_laid_bare() {
     for dug in [true, false] {
         let analysis = Analysis::PlaneStrain;
         let mut mesh = grid(&[0.0, 1.0], &[0.0, 2.0, 3.0], |_, j| j, Shape::Rectangles);
-        mesh.name_line("floor", |e| e.iter().all(|n| (n[1] - 2.0).abs() < 1e-9));
+        name(&mut mesh, "floor", 1, 2.0);
         let mut problem = Problem::new(analysis, mesh);
         for name in ["lower", "upper"] {
             let mut group = solid(name, elastic(analysis, E, NU));
@@ -412,52 +264,11 @@ fn a_pressure_acts_on_a_surface_laid_bare() {
             dig.deactivate = vec![1];
         }
         let mut load = Phase::new("load", 1);
-        load.pressure = vec![Pressure {
-            line: "floor".to_owned(),
-            value: 50.0.into(),
-        }];
+        load.pressure = pressed("floor", 50.0);
         problem.phases = vec![dig, load];
         let simulation = run(problem);
         let reaction = simulation.reaction_of("bottom").unwrap()[1];
         assert!((reaction - 86.0).abs() < 1e-9, "{dug}: {reaction}");
-    }
-}
-
-/// A stiffness that grows with depth: ∫ q/E_oed dz, element by element.
-#[test]
-fn a_stiffness_that_grows_with_depth_is_that_of_each_element() {
-    for shape in SHAPES {
-        let analysis = Analysis::PlaneStrain;
-        let y: Vec<f64> = (0..=8).map(|i| f64::from(i) * 0.5).collect();
-        let mesh = grid(&[0.0, 1.0], &y, |_, _| 0, shape);
-        let mut problem = Problem::new(analysis, mesh);
-        let mut ground = elastic(analysis, E, 0.0);
-        let profile = Profile::new(vec![[0.0, 3e4], [4.0, 1e4]]).unwrap();
-        let variation = Variation::Height(profile.clone());
-        ground.varying = vec![("young_modulus".to_owned(), variation)];
-        problem.groups = vec![solid("ground", ground)];
-        problem.supports = roller_box();
-        let mut load = Phase::new("load", 1);
-        load.pressure = vec![Pressure {
-            line: "top".to_owned(),
-            value: 100.0.into(),
-        }];
-        problem.phases = vec![load];
-        let top = -run(problem).displacement_of("top").unwrap()[1];
-        let sum: f64 = y
-            .windows(2)
-            .map(|r| 50.0 / profile.at(f64::midpoint(r[0], r[1])))
-            .sum();
-        // Triangles of one row take their own centres' stiffness.
-        let tolerance = if shape == Shape::Triangles || shape == Shape::Mixed {
-            0.02
-        } else {
-            1e-9
-        };
-        assert!(
-            (top / sum - 1.0).abs() < tolerance,
-            "{shape:?}: {top} {sum}"
-        );
     }
 }
 

@@ -1,14 +1,7 @@
 //! Random joints on random walks.
 
 use super::*;
-
-/// A linear congruential generator (Knuth's MMIX constants), uniform in [a, b).
-fn random(seed: &mut u64, a: f64, b: f64) -> f64 {
-    *seed = seed
-        .wrapping_mul(6_364_136_223_846_793_005)
-        .wrapping_add(1_442_695_040_888_963_407);
-    a + (b - a) * (*seed >> 11) as f64 / (1_u64 << 53) as f64
-}
+use walk::random;
 
 fn sand(seed: &mut u64) -> Parameters {
     let normal_stiffness = 10_f64.powf(random(seed, 3.0, 9.0));

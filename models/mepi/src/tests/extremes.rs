@@ -114,20 +114,6 @@ fn scales_with_stress_and_length() {
 }
 
 #[test]
-fn a_hundred_thousand_increments_give_the_integral() {
-    let law = mepi(TABLE_4);
-    let truth = Truth::hardening(TABLE_4, 100.0);
-    let u_t = 2e-3;
-    let mut walker = Walker::new(&law, 100.0);
-    for _ in 0..100_000 {
-        walker.step([0.0, u_t / 1e5]);
-    }
-    let [_, sigma, tau] = truth.at_slip(u_t, f64::INFINITY);
-    assert_relative_eq!(walker.sigma(), sigma, max_relative = 2e-4);
-    assert_relative_eq!(walker.tau(), tau, max_relative = 2e-4);
-}
-
-#[test]
 fn a_zero_increment_changes_nothing() {
     let law = softening(SILICA);
     let mut walker = Walker::new(&law, 100.0);

@@ -30,10 +30,6 @@ fn controlled(tolerance: f64) -> Mepi {
     mepi_by(within(tolerance), TABLE_4)
 }
 
-fn softening_by(scheme: SchemeParameters, p: mepi_softening::Parameters) -> MepiSoftening {
-    softening(mepi_softening::Parameters { scheme, ..p })
-}
-
 /// Slip at constant volume, and the largest relative error of `σ_n`, τ and ξ against quadrature.
 fn error_at_constant_volume<L: InterfaceLaw<State = State>>(
     law: &L,
@@ -54,28 +50,6 @@ fn error_at_constant_volume<L: InterfaceLaw<State = State>>(
         .fold(0.0, f64::max)
 }
 
-#[test]
-fn the_error_of_explicit_steps_falls_as_one_over_their_number() {
-    let truth = Truth::hardening(TABLE_4, 100.0);
-    let errors = [100.0, 200.0, 400.0, 800.0]
-        .map(|n| error_at_constant_volume(&explicit(n), &truth, 1e-3, 1));
-    for pair in errors.windows(2) {
-        let order = (pair[0] / pair[1]).log2();
-        assert!((0.8..1.2).contains(&order), "{errors:?}");
-    }
-    for p in [FONTAINEBLEAU, SILICA] {
-        let truth = Truth::softening(p, 100.0);
-        let errors = [2000.0, 4000.0, 8000.0].map(|substeps| {
-            let law = softening_by(in_steps(substeps), p);
-            error_at_constant_volume(&law, &truth, 1e-3, 1)
-        });
-        for pair in errors.windows(2) {
-            let order = (pair[0] / pair[1]).log2();
-            assert!((0.8..1.2).contains(&order), "{errors:?}");
-        }
-    }
-}
-
 /// The next increment first corrects the drift of the last one, so increments are worth more than
 /// substeps.
 #[test]
@@ -84,21 +58,6 @@ fn the_drift_does_not_accumulate_over_increments() {
     let one = error_at_constant_volume(&explicit(400.0), &truth, 1e-3, 1);
     let many = error_at_constant_volume(&explicit(1.0), &truth, 1e-3, 400);
     assert!(many < one, "{one:e} {many:e}");
-}
-
-#[test]
-fn error_control_meets_its_tolerance_in_one_increment() {
-    for tolerance in [1e-3, 1e-4, 1e-5, 1e-6] {
-        let truth = Truth::hardening(TABLE_4, 100.0);
-        let error = error_at_constant_volume(&controlled(tolerance), &truth, 1e-3, 1);
-        assert!(error < 10.0 * tolerance, "{error:e} at {tolerance:e}");
-        for p in [FONTAINEBLEAU, SILICA] {
-            let truth = Truth::softening(p, 100.0);
-            let law = softening_by(within(tolerance), p);
-            let error = error_at_constant_volume(&law, &truth, 3e-3, 1);
-            assert!(error < 10.0 * tolerance, "{error:e} at {tolerance:e}");
-        }
-    }
 }
 
 /// A reversal within one increment and back: against implicit steps, extrapolated to no size.
@@ -222,86 +181,4 @@ fn the_published_jump_takes_the_implicit_scheme() {
         ..published(FONTAINEBLEAU)
     });
     assert_eq!(refused.unwrap_err().parameter, "scheme");
-}
-
-/// Every scheme gives finite numbers on the surface, or says why not.
-#[test]
-fn stands_random_states() {
-    let mut random = Random(11);
-    for k in 0..400 {
-        let mu_p = random.between(0.05, 1.5);
-        let common = Common {
-            k_n: random.decades(1e2, 1e9),
-            k_t: random.decades(1e2, 1e9),
-            mu_0: mu_p * (random.unit() - 0.3).max(0.0),
-            mu_p,
-            mu_c0: mu_p * random.unit(),
-            a: random.decades(1e-5, 1.0),
-            c_0: random.decades(1e-3, 1e2),
-            ..FONTAINEBLEAU.common
-        };
-        let peak = SofteningParameters {
-            mu_r: mu_p * random.unit(),
-            ..FONTAINEBLEAU.softening
-        };
-        let controls = k % 2 == 1;
-        let scheme = if controls {
-            within(1e-4)
-        } else {
-            in_steps(10.0)
-        };
-        let p = mepi_softening::Parameters {
-            common,
-            softening: peak,
-            scheme,
-        };
-        let law = softening(p);
-        let truth = Truth::softening(p, 100.0);
-        let mut walker = Walker::new(&law, 100.0);
-        for _ in 0..20 {
-            let size = random.decades(1e-2, 1e2) * 100.0;
-            let du = [
-                random.between(-0.3, 0.5) * size / truth.k_n(),
-                random.between(-1.0, 1.0) * size / truth.k_t(),
-            ];
-            let Ok(end) = walker.respond(du, Tangent::Consistent) else {
-                break;
-            };
-            let numbers = end.traction.iter().chain(end.tangent.as_flattened());
-            assert!(numbers.copied().all(f64::is_finite), "{p:?} {end:?}");
-            assert!(end.traction[0] <= 0.0, "{p:?} {end:?}");
-            if controls {
-                let strength = -end.traction[0] * truth.mu(end.state.plastic_slip);
-                assert!(
-                    end.traction[1].abs() <= strength * (1.0 + 1e-9) + 1e-12,
-                    "{p:?} {end:?}"
-                );
-            }
-            walker.step(du);
-        }
-    }
-}
-
-/// In a thin layer hardening takes a slip far below the increment: the first steps that do not lose
-/// contact are small, and contact is not lost.
-#[test]
-fn an_increment_far_longer_than_the_hardening_is_followed() {
-    let t = 5e-7;
-    let sand = FONTAINEBLEAU.common;
-    let common = Common {
-        k_n: sand.k_n * sand.t / t,
-        k_t: sand.k_t * sand.t / t,
-        t,
-        sigma_ni: 100.0,
-        ..sand
-    };
-    let p = mepi_softening::Parameters {
-        common,
-        ..FONTAINEBLEAU
-    };
-    let truth = Truth::softening(p, 100.0);
-    for u_t in [1e-6, 1e-4, 1e-3] {
-        let error = error_at_constant_volume(&softening_by(within(1e-6), p), &truth, u_t, 1);
-        assert!(error < 1e-5, "{error:e} at {u_t:e}");
-    }
 }
