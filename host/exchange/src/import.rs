@@ -1,8 +1,8 @@
 //! Results of another program as a table like that of a run.
 
-use crate::model::{AtNodes, Model, Quantity};
+use crate::model::{AtNodes, Model, Quantity, Step};
 use crate::{Error, MODEL, Program, calculix, kratos, opengeosys, vtu};
-use results::number;
+use results::{comma_separated, number};
 use serde_json::{Map, Value, json};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -58,8 +58,7 @@ pub fn import(folder: &Path, out: Option<&Path>) -> Result<PathBuf, Error> {
     let rows: Vec<Vec<f64>> = (0..n_rows).map(|step| row(&model, &found, step)).collect();
     let out = out.unwrap_or(folder);
     std::fs::create_dir_all(out).map_err(|error| text::Error::unwritable(out, error))?;
-    let table = table(&model, &rows).map_err(|error| Error::internal(error.to_string()))?;
-    replace(&out.join("history.csv"), table)?;
+    replace(&out.join("history.csv"), table(&model, &rows)?)?;
     let last = rows.last().into_iter().flatten();
     let probes = model.probes.iter().zip(last);
     let probes: Map<String, Value> = probes.map(|(p, v)| (p.name.clone(), json!(v))).collect();
@@ -130,21 +129,13 @@ fn out_of_balance(model: &Model, found: &Found, step: usize) -> f64 {
 
 fn read(path: &Path) -> Result<String, Error> {
     // Binary parts of a file are no text, but are not looked at.
-    let bytes = std::fs::read(path);
-    let bytes = bytes.map_err(|source| text::Error::Unreadable {
-        path: path.to_owned(),
-        source,
-    })?;
+    let bytes = std::fs::read(path).map_err(|why| text::Error::unreadable(path, why))?;
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
 fn unreadable(path: &Path, why: impl Into<String>) -> Error {
     let source = io::Error::new(io::ErrorKind::InvalidData, why.into());
-    text::Error::Unreadable {
-        path: path.to_owned(),
-        source,
-    }
-    .into()
+    text::Error::unreadable(path, source).into()
 }
 
 fn of_opengeosys(folder: &Path, model: &Model) -> Result<Vec<Found>, Error> {
@@ -282,23 +273,16 @@ fn reaction(model: &Model, found: &[Found], step: usize, at: &AtNodes) -> f64 {
         }
 }
 
-fn table(model: &Model, rows: &[Vec<f64>]) -> Result<Vec<u8>, csv::Error> {
-    let mut table = csv::Writer::from_writer(Vec::new());
-    let header = ["phase", "increment", "time"].into_iter();
-    let header = header.chain(model.probes.iter().map(|p| p.name.as_str()));
-    table.write_record(header.chain(["iterations"]))?;
-    for (step, row) in model.steps.iter().zip(rows) {
-        let place = [
-            step.phase.clone(),
-            step.increment.to_string(),
-            number(step.time),
-        ];
-        let row = place
-            .into_iter()
-            .chain(row.iter().map(|value| number(*value)));
-        table.write_record(row.chain([String::new()]))?;
-    }
-    table
-        .into_inner()
-        .map_err(|error| error.into_error().into())
+fn table(model: &Model, rows: &[Vec<f64>]) -> Result<String, Error> {
+    let columns = ["phase", "increment", "time"].into_iter();
+    let columns = columns.chain(model.probes.iter().map(|p| p.name.as_str()));
+    let cells = |(step, row): (&Step, &Vec<f64>)| {
+        let mut cells = vec![step.phase.clone(), step.increment.to_string()];
+        cells.push(number(step.time));
+        cells.extend(row.iter().map(|value| number(*value)));
+        cells.push(String::new());
+        cells
+    };
+    let rows = model.steps.iter().zip(rows).map(cells);
+    Ok(comma_separated(columns.chain(["iterations"]), rows)?)
 }

@@ -8,8 +8,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::fmt;
 use std::ops::Range;
-use text::InputError;
-use toml::Spanned;
+use text::{InputError, Spanned};
 
 /// A key that is not carried, although the rest is.
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -28,8 +28,7 @@ use mechanics::simulation::Warning;
 use results::{About, OutputRequest};
 use std::cell::RefCell;
 use std::sync::Arc;
-use text::Source;
-use toml::Spanned;
+use text::{Source, Spanned};
 
 /// Water stands above the ground where it is higher by this part of the ground's height.
 const ABOVE: f64 = 1e-9;
@@ -436,7 +435,7 @@ fn materials(
     (number, name, input): (usize, &Spanned<String>, &GroupInput),
     phases: &mut [Phase],
 ) -> Result<Material, Error> {
-    shelf.entry(&input.law)?;
+    shelf.entry(input.law.get_ref(), input.law.span())?;
     // A law that the first phase replaces is never used, and not loaded.
     let mut own = None;
     for (phase, into) in shelf.file.phases.iter().zip(phases) {

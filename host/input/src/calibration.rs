@@ -6,12 +6,10 @@ use crate::{Error, measured};
 use results::output_request::Measured;
 use schemars::JsonSchema;
 use serde::Deserialize;
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use text::base::{OtherKind, read_kind};
-use text::{Named, Source};
-use toml::Spanned;
+use text::{Named, Source, Spanned};
 
 /// What other files look like among calibrations.
 const OTHER: OtherKind = OtherKind {
@@ -46,11 +44,9 @@ pub struct CalibrationFile {
     #[serde(default)]
     pub title: String,
     /// Parameters to be found, by name.
-    #[schemars(with = "BTreeMap<String, FreeInput>")]
     pub free: Named<FreeInput>,
     /// Parameters with another value than in the files of the tests, by name.
     #[serde(default)]
-    #[schemars(with = "BTreeMap<String, FixedInput>")]
     pub fixed: Named<FixedInput>,
     /// The tests.
     pub test: Vec<TestInput>,
@@ -59,7 +55,7 @@ pub struct CalibrationFile {
     pub stage: Vec<StageInput>,
     /// Number of starts of the search: the given one, and others over the ranges; default 8, with cases
     /// 2.
-    #[schemars(with = "Option<usize>", range(min = 1))]
+    #[schemars(range(min = 1))]
     pub starts: Option<Spanned<usize>>,
     /// Seed of the starts.
     #[serde(default)]
@@ -69,14 +65,14 @@ pub struct CalibrationFile {
     pub variance: Variance,
     /// Probability that an interval holds the true value.
     #[serde(default = "confidence")]
-    #[schemars(with = "f64", extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
+    #[schemars(extend("exclusiveMinimum" = 0, "exclusiveMaximum" = 1))]
     pub confidence: Spanned<f64>,
     /// Compute the profile of each parameter: the best sum of squares for values near the best one.
     #[serde(default = "yes")]
     pub profiles: bool,
     /// Step of differences over a parameter's range, on a logarithmic scale over its value; default
     /// 1e-4, with cases the root of the loosest force tolerance.
-    #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0, "maximum" = 0.1))]
+    #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 0.1))]
     pub difference: Option<Spanned<f64>>,
 }
 
@@ -114,23 +110,17 @@ pub enum Scale {
 #[serde(deny_unknown_fields)]
 pub struct FreeInput {
     /// Id of the law's parameter; default: the name.
-    #[schemars(with = "Option<String>")]
     pub parameter: Option<Spanned<String>>,
     /// Cases: its tables under `[laws]`; without them it belongs to drivers alone.
     #[serde(default)]
-    #[schemars(with = "Vec<String>")]
     pub laws: Vec<Spanned<String>>,
     /// Start of the search; default: its value in the first test.
-    #[schemars(with = "Option<f64>")]
     pub start: Option<Spanned<f64>>,
     /// Least value; default: the law's bound.
-    #[schemars(with = "Option<f64>")]
     pub min: Option<Spanned<f64>>,
     /// Greatest value; default: the law's bound.
-    #[schemars(with = "Option<f64>")]
     pub max: Option<Spanned<f64>>,
     /// Scale; default `log` if the law takes only values above 0.
-    #[schemars(with = "Option<Scale>")]
     pub scale: Option<Spanned<Scale>>,
 }
 
@@ -139,14 +129,11 @@ pub struct FreeInput {
 #[serde(deny_unknown_fields)]
 pub struct FixedInput {
     /// Id of the law's parameter; default: the name.
-    #[schemars(with = "Option<String>")]
     pub parameter: Option<Spanned<String>>,
     /// Cases: its tables under `[laws]`; without them it belongs to drivers alone.
     #[serde(default)]
-    #[schemars(with = "Vec<String>")]
     pub laws: Vec<Spanned<String>>,
     /// Its value.
-    #[schemars(with = "ParameterValue")]
     pub value: Spanned<ParameterValue>,
 }
 
@@ -155,20 +142,15 @@ pub struct FixedInput {
 #[serde(deny_unknown_fields)]
 pub struct TestInput {
     /// Name.
-    #[schemars(with = "String")]
     pub name: Spanned<String>,
     /// A driver file, relative to this one.
-    #[schemars(with = "Option<PathBuf>")]
     pub driver: Option<Spanned<PathBuf>>,
     /// Instead of a driver: a case file or its folder, relative to this one.
-    #[schemars(with = "Option<PathBuf>")]
     pub case: Option<Spanned<PathBuf>>,
     /// Variant of that file.
-    #[schemars(with = "Option<String>")]
     pub variant: Option<Spanned<String>>,
     /// Drivers: the table under `[laws]` of cases that has the same law. Names with this table in `laws`
     /// belong to it; default: to every driver with the parameter.
-    #[schemars(with = "Option<String>")]
     pub stands_for: Option<Spanned<String>>,
     /// Predict the test from the others, do not fit it.
     #[serde(default)]
@@ -176,7 +158,7 @@ pub struct TestInput {
     /// Factor of its squared residuals. It moves the values found, but is no information: equal weights
     /// change no interval.
     #[serde(default = "weight")]
-    #[schemars(with = "f64", extend("exclusiveMinimum" = 0))]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub weight: Spanned<f64>,
     /// Measured curves.
     pub curve: Vec<CurveInput>,
@@ -191,47 +173,39 @@ fn weight() -> Spanned<f64> {
 #[serde(deny_unknown_fields)]
 pub struct CurveInput {
     /// Computed column that the test imposes: it only grows or only falls.
-    #[schemars(with = "String")]
     pub x: Spanned<String>,
     /// Computed column that is compared.
-    #[schemars(with = "String")]
     pub y: Spanned<String>,
     /// Text of this axis.
     pub x_label: Option<String>,
     /// Text of this axis.
     pub y_label: Option<String>,
     /// Drivers: only this segment.
-    #[schemars(with = "Option<usize>", range(min = 1))]
+    #[schemars(range(min = 1))]
     pub segment: Option<Spanned<usize>>,
     /// Cases: the phase; default: the last one.
-    #[schemars(with = "Option<String>")]
     pub phase: Option<Spanned<String>>,
     /// Measured points, after their scale in the unit of the computed columns.
-    #[schemars(with = "MeasuredInput")]
     pub measured: Spanned<MeasuredInput>,
     /// Standard deviation of measured values, in the unit of `y`; default 1 % of the largest, without
     /// `relative_noise`.
-    #[schemars(with = "Option<f64>", range(min = 0))]
+    #[schemars(range(min = 0))]
     pub noise: Option<Spanned<f64>>,
     /// Part of the noise that grows with the measured value.
-    #[schemars(with = "Option<f64>", range(min = 0))]
+    #[schemars(range(min = 0))]
     pub relative_noise: Option<Spanned<f64>>,
     /// Offset of measured `x` (slack, wrong zero), fitted with the parameters; default 0.
-    #[schemars(with = "Option<ReadingInput>")]
     pub offset_x: Option<Spanned<ReadingInput>>,
     /// Factor on measured `x` before the offset, fitted likewise; default 1.
-    #[schemars(with = "Option<ReadingInput>")]
     pub scale_x: Option<Spanned<ReadingInput>>,
     /// Offset of measured `y`, fitted likewise; default 0.
-    #[schemars(with = "Option<ReadingInput>")]
     pub offset_y: Option<Spanned<ReadingInput>>,
     /// Factor on measured `y` before the offset, fitted likewise; default 1.
-    #[schemars(with = "Option<ReadingInput>")]
     pub scale_y: Option<Spanned<ReadingInput>>,
     /// Factor of its squared residuals. It moves the values found, but is no information: equal weights
     /// change no interval.
     #[serde(default = "weight")]
-    #[schemars(with = "f64", extend("exclusiveMinimum" = 0))]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub weight: Spanned<f64>,
 }
 
@@ -265,14 +239,11 @@ impl CurveInput {
 #[serde(deny_unknown_fields)]
 pub struct StageInput {
     /// Name.
-    #[schemars(with = "String")]
     pub name: Spanned<String>,
     /// The parameters.
-    #[schemars(with = "Vec<String>")]
     pub free: Vec<Spanned<String>>,
     /// Tests for the fit; default: all that are not predicted.
     #[serde(default)]
-    #[schemars(with = "Vec<String>")]
     pub tests: Vec<Spanned<String>>,
 }
 

@@ -18,7 +18,7 @@ pub use read::Case;
 
 use crate::accuracy_settings::AccuracySettings;
 use crate::ground::{StressInput, WaterInput};
-use crate::material::{ParameterTable, ParameterValue, Route, foreign, shear_zone};
+use crate::material::{ParameterTable, Route, foreign, shear_zone};
 use crate::spanned::Given;
 use crate::{Error, schema};
 use law::ShearZone;
@@ -28,10 +28,8 @@ use mechanics::problem::{self, Analysis, Drainage, Formulation, InPlane, Integra
 use results::output_request::Output;
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, de};
-use std::collections::BTreeMap;
 use std::path::PathBuf;
-use text::{Named, Source};
-use toml::Spanned;
+use text::{Named, Source, Spanned};
 
 /// The keys of a case file. Units: kN, m, kPa; angles in degrees.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -44,18 +42,14 @@ pub struct CaseFile {
     pub analysis: Analysis,
     /// Folders with law libraries, relative to the file.
     #[serde(default)]
-    #[schemars(with = "Vec<PathBuf>")]
     pub law_path: Vec<Spanned<PathBuf>>,
     /// The mesh.
     pub mesh: MeshInput,
     /// Laws and their parameters, by a name for groups.
-    #[schemars(with = "BTreeMap<String, LawInput>")]
     pub laws: Named<LawInput>,
     /// Element groups, by a name for regions.
-    #[schemars(with = "BTreeMap<String, GroupInput>")]
     pub groups: Named<GroupInput>,
     /// Ground water; none if left out.
-    #[schemars(with = "Option<WaterInput>")]
     pub water: Option<Spanned<WaterInput>>,
     /// Displacements held at zero.
     #[serde(default)]
@@ -65,7 +59,6 @@ pub struct CaseFile {
     pub phases: Vec<PhaseInput>,
     /// Quantities written for every increment.
     #[serde(default)]
-    #[schemars(with = "BTreeMap<String, ProbeInput>")]
     pub probes: Named<ProbeInput>,
     /// A pile: forces, friction and settlement of every increment; resistance at the end.
     pub pile: Option<PileInput>,
@@ -74,18 +67,16 @@ pub struct CaseFile {
     pub figures: Vec<FigureInput>,
     /// Solver settings.
     #[serde(default = "default_solver")]
-    #[schemars(with = "Settings")]
     pub solver: Spanned<Settings>,
     /// Output.
     #[serde(default)]
     pub output: Output,
     /// Relative error that the probes may have: a study before the run finds settings that reach it.
     #[serde(default, deserialize_with = "accuracy")]
-    #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0, "maximum" = 0.5))]
+    #[schemars(extend("exclusiveMinimum" = 0, "maximum" = 0.5))]
     pub accuracy: Option<Spanned<f64>>,
     /// `accuracy` includes the error of the mesh: the mesh is refined as well.
     #[serde(default)]
-    #[schemars(with = "Option<bool>")]
     pub accuracy_with_mesh: Option<Spanned<bool>>,
     /// The settings that such a study chose.
     #[serde(skip)]
@@ -128,49 +119,37 @@ impl CaseFile {
 #[serde(deny_unknown_fields)]
 pub struct LawInput {
     /// Id of the law.
-    #[schemars(with = "String")]
     pub law: Spanned<String>,
     /// SHA-256 that the law's library must have, in hexadecimal digits.
-    #[schemars(with = "Option<String>")]
     pub sha256: Option<Spanned<String>>,
     /// Program that the law's library is made for, if not for the contract; or another law as its
     /// source.
-    #[schemars(with = "Option<Route>")]
     pub adapter: Option<Spanned<Route>>,
     /// That library, relative to the file.
-    #[schemars(with = "Option<PathBuf>")]
     pub library: Option<Spanned<PathBuf>>,
     /// Its sidecar, or description.
-    #[schemars(with = "Option<PathBuf>")]
     pub sidecar: Option<Spanned<PathBuf>>,
     /// Call the law in this process.
-    #[schemars(with = "Option<bool>")]
     pub in_process: Option<Spanned<bool>>,
     /// File for the arguments of one call.
-    #[schemars(with = "Option<PathBuf>")]
     pub record: Option<Spanned<PathBuf>>,
     /// Routines that the library calls and nobody supplies.
-    #[schemars(with = "Option<Externals>")]
     pub externals: Option<Spanned<Externals>>,
     /// Scratch files of the library.
-    #[schemars(with = "Option<Scratch>")]
     pub scratch: Option<Spanned<Scratch>>,
     /// UDSM: order of its stiffness in memory; default `columns`.
-    #[schemars(with = "Option<Order>")]
     pub tangent_order: Option<Spanned<Order>>,
     /// Shear zone: its thickness, m. `law` is a law of solids, or a table of `laws`.
-    #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0))]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub thickness: Option<Spanned<f64>>,
     /// Shear zone: initial stress along it and out of plane over the normal traction; default 1.
-    #[schemars(with = "Option<f64>", range(min = 0))]
+    #[schemars(range(min = 0))]
     pub lateral_ratio: Option<Spanned<f64>>,
     /// Its parameters: numbers, choices, expressions.
     #[serde(default)]
-    #[schemars(with = "BTreeMap<String, ParameterValue>")]
     pub parameters: ParameterTable,
     /// Initial internal variables, instead of the law's.
     #[serde(default)]
-    #[schemars(with = "BTreeMap<String, f64>")]
     pub initial: Named<f64>,
 }
 
@@ -203,41 +182,30 @@ pub struct GroupInput {
     /// Kind of element.
     pub formulation: Formulation,
     /// Name under `laws`; phases may swap it.
-    #[schemars(with = "String")]
     pub law: Spanned<String>,
     /// Integration points; default: solids `projected`, thin layers `full`, zero thickness `nodes`.
-    #[schemars(with = "Option<Integration>")]
     pub integration: Option<Spanned<Integration>>,
     /// Zero thickness: the line of the elements.
-    #[schemars(with = "Option<String>")]
     pub line: Option<Spanned<String>>,
     /// Zero thickness: ends of that line on the model's outline; default `open`.
-    #[schemars(with = "Option<Ends>")]
     pub ends: Option<Spanned<Ends>>,
     /// Thin layer: direction across it; default: the shorter side.
-    #[schemars(with = "Option<Axis>")]
     pub normal: Option<Spanned<Axis>>,
     /// Thin layer with an interface law: elasticity along the layer.
-    #[schemars(with = "Option<InPlane>")]
     pub in_plane: Option<Spanned<InPlane>>,
     /// Effective stress before the first phase, tension positive.
-    #[schemars(with = "Option<StressInput>")]
     pub initial_stress: Option<Spanned<StressInput>>,
     /// Unit weight above the water, kN/m³; default 0.
-    #[schemars(with = "Option<f64>")]
     pub unit_weight: Option<Spanned<f64>>,
     /// Unit weight below the water, kN/m³; default `unit_weight`.
-    #[schemars(with = "Option<f64>")]
     pub saturated_unit_weight: Option<Spanned<f64>>,
     /// Water fills the pores below the water table; default true. Laws see effective stresses.
     pub pore_water: Option<bool>,
     /// Present from the start; default true. Phases activate and deactivate.
     pub active: Option<bool>,
     /// Drainage of pore water; default `drained`.
-    #[schemars(with = "Option<Drainage>")]
     pub drainage: Option<Spanned<Drainage>>,
     /// Undrained: Poisson's ratio with the pore water; default 0.495.
-    #[schemars(with = "Option<f64>")]
     pub undrained_poisson_ratio: Option<Spanned<f64>>,
 }
 
@@ -278,7 +246,6 @@ impl From<Axis> for problem::Axis {
 #[serde(deny_unknown_fields)]
 pub struct SupportInput {
     /// The line.
-    #[schemars(with = "String")]
     pub line: Spanned<String>,
     /// The components.
     pub fixed: Vec<Axis>,

@@ -20,12 +20,10 @@ use results::output_request::Figure;
 use results::point_figure::drawable;
 use schemars::JsonSchema;
 use serde::Deserialize;
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use text::base::{OtherKind, read_kind};
-use text::{Named, Source};
-use toml::Spanned;
+use text::{Named, Source, Spanned};
 
 /// What a case file looks like among driver files.
 const CASE: OtherKind = OtherKind {
@@ -40,62 +38,48 @@ const CASE: OtherKind = OtherKind {
 #[schemars(rename = "File")]
 pub(crate) struct DriverFile {
     /// Id of the law.
-    #[schemars(with = "String")]
     law: Spanned<String>,
     /// SHA-256 that the law's library must have, in hexadecimal digits.
-    #[schemars(with = "Option<String>")]
     sha256: Option<Spanned<String>>,
     /// Program that the law's library is made for, if not for the contract; or another law as its
     /// source.
-    #[schemars(with = "Option<Route>")]
     adapter: Option<Spanned<Route>>,
     /// That library, relative to the file.
-    #[schemars(with = "Option<PathBuf>")]
     library: Option<Spanned<PathBuf>>,
     /// Its sidecar, or description.
-    #[schemars(with = "Option<PathBuf>")]
     sidecar: Option<Spanned<PathBuf>>,
     /// Call the law in this process.
-    #[schemars(with = "Option<bool>")]
     in_process: Option<Spanned<bool>>,
     /// File for the arguments of one call.
-    #[schemars(with = "Option<PathBuf>")]
     record: Option<Spanned<PathBuf>>,
     /// Routines that the library calls and nobody supplies.
-    #[schemars(with = "Option<Externals>")]
     externals: Option<Spanned<Externals>>,
     /// Scratch files of the library.
-    #[schemars(with = "Option<Scratch>")]
     scratch: Option<Spanned<Scratch>>,
     /// UDSM: order of its stiffness in memory; default `columns`.
-    #[schemars(with = "Option<Order>")]
     tangent_order: Option<Spanned<Order>>,
     /// Shear zone: its thickness, m. `law` is a law of solids, or a table of `laws`.
-    #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0))]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     thickness: Option<Spanned<f64>>,
     /// Shear zone: initial stress along it and out of plane over the normal traction; default 1.
-    #[schemars(with = "Option<f64>", range(min = 0))]
+    #[schemars(range(min = 0))]
     lateral_ratio: Option<Spanned<f64>>,
     /// Shear zone: the law that fills it.
     #[serde(default)]
-    #[schemars(with = "BTreeMap<String, LawInput>")]
     laws: Named<LawInput>,
     /// Title.
     #[serde(default)]
     title: String,
     /// Folders with law libraries, relative to the file.
     #[serde(default)]
-    #[schemars(with = "Vec<PathBuf>")]
     law_path: Vec<Spanned<PathBuf>>,
     /// Hypothesis, with its components.
     #[schemars(with = "schema::HypothesisName")]
     hypothesis: Spanned<String>,
     /// Its parameters.
     #[serde(default)]
-    #[schemars(with = "BTreeMap<String, ParameterValue>")]
     parameters: ParameterTable,
     /// Initial state; default 0.
-    #[schemars(with = "Option<Initial>")]
     initial: Option<Spanned<Initial>>,
     /// The path.
     #[serde(default)]
@@ -152,7 +136,6 @@ struct Initial {
     stress: Option<Spanned<Named<f64>>>,
     /// Internal variables, by id.
     #[serde(default)]
-    #[schemars(with = "BTreeMap<String, f64>")]
     internal: Named<f64>,
 }
 
@@ -161,10 +144,10 @@ struct Initial {
 #[serde(deny_unknown_fields)]
 struct SegmentTable {
     /// Number of equal increments.
-    #[schemars(with = "i64", range(min = 1))]
+    #[schemars(range(min = 1))]
     increments: Spanned<i64>,
     /// Duration, in the law's unit of time; default: 1 for each increment.
-    #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0))]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     time: Option<Spanned<f64>>,
     /// Control of components; one without keeps its traction or stress.
     #[schemars(with = "schema::Components<ControlTable>")]
@@ -177,19 +160,14 @@ struct SegmentTable {
 #[schemars(extend("minProperties" = 1, "maxProperties" = 1))]
 struct ControlTable {
     /// Interfaces: jump, m.
-    #[schemars(with = "Option<f64>")]
     jump: Option<Spanned<f64>>,
     /// Interfaces: traction, kPa.
-    #[schemars(with = "Option<f64>")]
     traction: Option<Spanned<f64>>,
     /// Interfaces: the traction changes by −stiffness × jump since the start of the segment, kPa/m.
-    #[schemars(with = "Option<f64>")]
     stiffness: Option<Spanned<f64>>,
     /// Solids: strain.
-    #[schemars(with = "Option<f64>")]
     strain: Option<Spanned<f64>>,
     /// Solids: stress, kPa.
-    #[schemars(with = "Option<f64>")]
     stress: Option<Spanned<f64>>,
 }
 
@@ -226,7 +204,7 @@ impl Driver {
         path: &Path,
         settings: &[String],
     ) -> Result<Vec<Self>, Error> {
-        Self::build_all(opener, Source::read(path)?.with_settings(settings), true)
+        Self::variants_with(opener, Source::read(path)?.with_settings(settings), true)
     }
 
     /// As [`Driver::read_with`], whatever the lock next to the file says.
@@ -234,7 +212,7 @@ impl Driver {
     /// # Errors
     /// As [`Driver::read`].
     pub fn read_unlocked(opener: &Opener, path: &Path) -> Result<Vec<Self>, Error> {
-        Self::build_all(opener, Source::read(path)?, false)
+        Self::variants_with(opener, Source::read(path)?, false)
     }
 
     /// Takes the text of a driver file without variants and builds its law.
@@ -267,10 +245,6 @@ impl Driver {
         source: Source,
         locked: bool,
     ) -> Result<Vec<Self>, Error> {
-        Self::build_all(opener, source, locked)
-    }
-
-    fn build_all(opener: &Opener, source: Source, locked: bool) -> Result<Vec<Self>, Error> {
         let (source, files) = read_kind(source, &CASE)?;
         let driver = |(variant, file)| {
             let load = |file: &DriverFile| Self::load(opener, &source, file, locked);

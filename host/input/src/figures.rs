@@ -4,8 +4,7 @@ use crate::case::{Case, CutInput, FigureInput};
 use crate::{Error, measured};
 use results::output_request::{Cut, Figure};
 use results::pile::OF_STATION;
-use text::Source;
-use toml::Spanned;
+use text::{Source, Spanned};
 
 /// Quantities along a cut; `k_0` is the ratio of radial to vertical stress, both
 /// effective. Without water pore pressures are zero.

@@ -24,8 +24,7 @@ use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 use std::io;
 use std::path::{Path, PathBuf};
-use text::{Source, file};
-use toml::Spanned;
+use text::{Source, Spanned, file};
 
 /// Names that the case takes from the file.
 struct Wanted<'c> {
@@ -95,7 +94,6 @@ pub(crate) fn mesh(
     let scale = scale(source, input)?;
     let folder = source.path_at(&written.span()).parent();
     let path = folder.unwrap_or(Path::new(".")).join(written.get_ref());
-    let unreadable = |why: io::Error| Error::from(unreadable(&path, why));
     let bytes = match &input.content {
         Some(content) => Cow::Borrowed(&content[..]),
         None => Cow::Owned(file::read_mesh(&path).map_err(|why| {
@@ -108,14 +106,10 @@ pub(crate) fn mesh(
         if is_of_arrays {
             return Error::usage(format!("the mesh: {fault}"));
         }
-        unreadable(io::Error::new(io::ErrorKind::InvalidData, fault))
+        let why = io::Error::new(io::ErrorKind::InvalidData, fault);
+        text::Error::unreadable(&path, why).into()
     };
-    let contents = if is_of_arrays {
-        Contents::read_arrays(&bytes)
-    } else {
-        Contents::read(&bytes)
-    };
-    let contents = contents.map_err(wrong)?;
+    let contents = Contents::read(&bytes, is_of_arrays).map_err(wrong)?;
     let wanted = wanted(source, file, scale, &contents, &path)?;
     let assembled = assemble::assemble(&contents, &wanted).map_err(wrong)?;
     let mut mesh = assembled.mesh;
@@ -134,19 +128,12 @@ pub(crate) fn mesh(
     Ok((mesh, file))
 }
 
-fn unreadable(path: &Path, source: io::Error) -> text::Error {
-    text::Error::Unreadable {
-        path: path.to_owned(),
-        source,
-    }
-}
-
 /// The whole mesh of a file in plane strain: every physical surface is a group, in their order.
 ///
 /// # Errors
 /// The defect of the file, and its place.
 pub fn whole(bytes: &[u8]) -> Result<Mesh, String> {
-    let contents = Contents::read(bytes)?;
+    let contents = Contents::read(bytes, false)?;
     let [points, curves, surfaces] = counts(&contents);
     let names = |counts: &'_ Counts| counts.keys().cloned().collect::<Vec<_>>();
     let (surfaces, lines) = (names(&surfaces), [names(&curves), names(&points)].concat());

@@ -4,8 +4,7 @@ use crate::Error;
 use crate::case::{CaseFile, Coordinate, LineInput, PartInput, RegionInput};
 use mechanics::mesh::{Line, Mesh, Solid};
 use mechanics::problem::{Analysis, Formulation};
-use text::Source;
-use toml::Spanned;
+use text::{Source, Spanned};
 
 /// Columns or rows as the file says them.
 type Parts = Spanned<Vec<Spanned<PartInput>>>;

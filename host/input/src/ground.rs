@@ -5,8 +5,7 @@ use mechanics::problem::{AtRest, InitialStress, Profile, Ratio, Water};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::ops::Range;
-use text::Source;
-use toml::Spanned;
+use text::{Source, Spanned};
 
 /// A value, or values over the height.
 #[derive(Clone, Debug, Deserialize, JsonSchema, PartialEq)]
@@ -55,7 +54,6 @@ impl ProfileInput {
 #[serde(deny_unknown_fields)]
 pub struct WaterInput {
     /// Level, or points (x, level) from left to right.
-    #[schemars(with = "LevelInput")]
     pub level: Spanned<LevelInput>,
     /// Unit weight of water, kN/m³.
     #[serde(default = "of_water")]
@@ -67,7 +65,6 @@ pub struct WaterInput {
 #[serde(deny_unknown_fields)]
 pub struct WaterChange {
     /// Level at the end of the phase, or points (x, level).
-    #[schemars(with = "LevelInput")]
     pub level: Spanned<LevelInput>,
 }
 
@@ -121,31 +118,23 @@ impl WaterInput {
 pub struct StressInput {
     /// Along x (r).
     #[serde(rename = "stress_11", alias = "11")]
-    #[schemars(with = "Option<ProfileInput>")]
     pub s11: Option<Spanned<ProfileInput>>,
     /// Along y (z).
     #[serde(rename = "stress_22", alias = "22")]
-    #[schemars(with = "Option<ProfileInput>")]
     pub s22: Option<Spanned<ProfileInput>>,
     /// Out of plane (hoop).
     #[serde(rename = "stress_33", alias = "33")]
-    #[schemars(with = "Option<ProfileInput>")]
     pub s33: Option<Spanned<ProfileInput>>,
     /// Shear.
     #[serde(rename = "stress_12", alias = "12")]
-    #[schemars(with = "Option<ProfileInput>")]
     pub s12: Option<Spanned<ProfileInput>>,
     /// At rest: horizontal over vertical effective stress.
-    #[schemars(with = "Option<ProfileInput>")]
     pub k_0: Option<Spanned<ProfileInput>>,
     /// At rest, instead of `k_0`: angle of friction, degrees.
-    #[schemars(with = "Option<ProfileInput>")]
     pub friction_angle: Option<Spanned<ProfileInput>>,
     /// At rest: overconsolidation ratio; default 1. Also `ocr` of the group's law, if that has one.
-    #[schemars(with = "Option<ProfileInput>")]
     pub ocr: Option<Spanned<ProfileInput>>,
     /// At rest: pre-overburden pressure, kPa; default 0. Also `pop` of the group's law, if that has one.
-    #[schemars(with = "Option<ProfileInput>")]
     pub pop: Option<Spanned<ProfileInput>>,
     /// At rest: Poisson's ratio of unloading, needed with `ocr` or `pop`.
     pub poisson_ratio: Option<f64>,

@@ -20,8 +20,7 @@ use restrictions::restrictions;
 use std::f64::consts::TAU;
 use std::ops::Range;
 use std::path::Path;
-use text::Source;
-use toml::Spanned;
+use text::{Source, Spanned};
 
 /// Most increments of one file; a slip of the pen beyond.
 const MAX_INCREMENTS: usize = 10_000_000;

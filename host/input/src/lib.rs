@@ -35,7 +35,7 @@ use std::path::{Path, PathBuf};
 use text::{Source, base};
 
 /// The file that a path leads to: itself, or in a folder the one of this kind.
-fn file_in(path: &Path, kind: &str) -> PathBuf {
+pub fn file_in(path: &Path, kind: &str) -> PathBuf {
     if path.is_dir() {
         path.join(format!("{kind}.toml"))
     } else {

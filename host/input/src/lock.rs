@@ -7,12 +7,12 @@
 use crate::case::Case;
 use crate::driver::Driver;
 use crate::material::LawTables;
-use crate::{Error, is_driver};
+use crate::{Error, file_in, is_driver};
 use law::{LoadedLaw, Opener, Pins, SearchPath, lock_path};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use toml::Spanned;
+use text::Spanned;
 
 /// A law as it is written to a lock.
 #[derive(Debug, Serialize)]
@@ -29,11 +29,7 @@ struct Entry<'a> {
 /// # Errors
 /// The file or a library cannot be used, or the lock cannot be written.
 pub fn write(opener: &Opener, path: &Path) -> Result<PathBuf, Error> {
-    let path = if path.is_dir() {
-        path.join("case.toml")
-    } else {
-        path.to_owned()
-    };
+    let path = file_in(path, "case");
     let laws = if is_driver(&path)? {
         let drivers = Driver::read_unlocked(opener, &path)?;
         let laws = drivers

@@ -14,8 +14,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use std::ops::Range;
 use std::path::PathBuf;
-use text::{Named, Source, suggestion};
-use toml::Spanned;
+use text::{Named, Source, Spanned, suggestion};
 
 /// The value of a parameter as written in a file.
 #[derive(Clone, Debug, Deserialize, JsonSchema, PartialEq)]

@@ -6,8 +6,7 @@ use csv::{ByteRecord, Reader, ReaderBuilder};
 use results::output_request::Measured;
 use std::path::Path;
 use text::file::read_text;
-use text::{Source, suggestion};
-use toml::Spanned;
+use text::{Source, Spanned, suggestion};
 
 /// Most points of a table: a figure and the page of a report hold all of them.
 const MOST_POINTS: usize = 20_000;

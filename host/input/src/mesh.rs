@@ -6,8 +6,7 @@ use crate::{Error, gmsh, grid};
 use mechanics::mesh::{Along, CannotInsert, Mesh, Reason};
 use mechanics::problem::Formulation;
 use std::ops::Range;
-use text::Source;
-use toml::Spanned;
+use text::{Source, Spanned};
 
 /// A mesh, and the file that it came from.
 #[derive(Clone, Debug, Default)]

@@ -5,8 +5,7 @@ use crate::build::line;
 use crate::case::{Case, GroupNames, PileInput};
 use mechanics::Simulation;
 use results::pile::{Base, Misfit, Parts, Pile};
-use text::{Source, suggestion};
-use toml::Spanned;
+use text::{Source, Spanned, suggestion};
 
 /// The base of the pile: a group other than its shaft, or a line.
 fn base(

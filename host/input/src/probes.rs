@@ -14,8 +14,7 @@ use results::output_request::Reduce;
 use results::pressures::Pressure;
 use results::probe::{PointQuantity, Probe, Probes, section};
 use std::collections::HashSet;
-use text::{Named, Source, suggestion};
-use toml::Spanned;
+use text::{Named, Source, Spanned, suggestion};
 
 /// Components of stress and strain by the name they have in quantities.
 const COMPONENTS: [&str; 4] = ["11", "22", "33", "12"];

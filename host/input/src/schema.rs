@@ -159,39 +159,32 @@ fn take(schema: &mut Value, key: &str) -> Map<String, Value> {
     }
 }
 
-/// `r` and `z` as other names of `x` and `y`.
-pub(crate) fn radius_and_axis(schema: &mut Schema) {
+/// Other names of properties.
+fn also<'n>(schema: &mut Schema, names: impl IntoIterator<Item = (&'n str, &'n str)>) {
     let Some(properties) = schema.get_mut("properties").and_then(Value::as_object_mut) else {
         return;
     };
-    for (key, other) in [("x", "r"), ("y", "z")] {
+    for (key, other) in names {
         if let Some(property) = properties.get(key).cloned() {
             properties.insert(other.to_owned(), property);
         }
     }
 }
 
-/// `11` as another name of `stress_11`, and so on.
-pub(crate) fn components_alone(schema: &mut Schema) {
-    let Some(properties) = schema.get_mut("properties").and_then(Value::as_object_mut) else {
-        return;
-    };
-    for other in ["11", "22", "33", "12"] {
-        if let Some(property) = properties.get(&format!("stress_{other}")).cloned() {
-            properties.insert(other.to_owned(), property);
-        }
-    }
+/// `r` and `z` as other names of `x` and `y`.
+pub(crate) fn radius_and_axis(schema: &mut Schema) {
+    also(schema, [("x", "r"), ("y", "z")]);
 }
 
-/// `y` as another name of `z`, the height.
+/// `11` as another name of `stress_11`, and so on.
+pub(crate) fn components_alone(schema: &mut Schema) {
+    let names = ["stress_11", "stress_22", "stress_33", "stress_12"];
+    also(schema, names.map(|name| (name, &name["stress_".len()..])));
+}
+
+/// `y` as another name of `z`, the height: either of them.
 pub(crate) fn height(schema: &mut Schema) {
-    let Some(properties) = schema.get_mut("properties").and_then(Value::as_object_mut) else {
-        return;
-    };
-    if let Some(property) = properties.get("z").cloned() {
-        properties.insert("y".to_owned(), property);
-    }
-    // Either of them.
+    also(schema, [("z", "y")]);
     schema.remove("required");
 }
 

@@ -1,7 +1,7 @@
 //! Keys that a file may leave out, with their places.
 
 use std::ops::Range;
-use toml::Spanned;
+use text::Spanned;
 
 /// A key that may be left out.
 pub(crate) trait Given<T> {

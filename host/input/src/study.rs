@@ -9,11 +9,10 @@ use law::Opener;
 use results::study::{Output, Take};
 use schemars::JsonSchema;
 use serde::Deserialize;
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use text::{Named, Source};
-use toml::{Spanned, Value};
+use text::{Named, Source, Spanned};
+use toml::Value;
 
 /// Most runs of a study: their folders have five digits.
 pub const MOST_RUNS: usize = 99_999;
@@ -39,30 +38,25 @@ pub struct StudyFile {
     #[serde(default)]
     pub title: String,
     /// A case file, or a folder with `case.toml`, relative to this file.
-    #[schemars(with = "PathBuf")]
     pub case: Spanned<PathBuf>,
     /// Variant of the case.
-    #[schemars(with = "Option<String>")]
     pub variant: Option<Spanned<String>>,
     /// How values are chosen.
     pub method: Method,
     /// Runs of `latin_hypercube` and `sobol`; base points of `saltelli`: k + 2 runs each for k
     /// parameters.
-    #[schemars(with = "Option<usize>", extend("minimum" = 1))]
+    #[schemars(extend("minimum" = 1))]
     pub runs: Option<Spanned<usize>>,
     /// Seed of random numbers; default 0. The same seed gives the same runs.
-    #[schemars(with = "Option<u64>")]
     pub seed: Option<Spanned<u64>>,
     /// Each run has a report and figures; they can be written later, too.
     #[serde(default)]
     pub reports: bool,
     /// Parameters that vary.
     #[serde(rename = "parameter")]
-    #[schemars(with = "Vec<ParameterInput>")]
     pub parameters: Vec<Spanned<ParameterInput>>,
     /// Results that count, by name; default: last values of all probes.
     #[serde(default)]
-    #[schemars(with = "BTreeMap<String, OutputInput>")]
     pub outputs: Named<OutputInput>,
 }
 
@@ -106,25 +100,20 @@ impl Method {
 #[serde(deny_unknown_fields)]
 pub struct ParameterInput {
     /// Name in tables and figures; default: the key.
-    #[schemars(with = "Option<String>")]
     pub name: Option<Spanned<String>>,
     /// Dotted path in the case file, as of `--set`; or several with the same value.
-    #[schemars(with = "Keys")]
     pub key: Spanned<Keys>,
     /// These values.
     #[schemars(with = "Option<Vec<schema::AnyValue>>")]
     pub values: Option<Spanned<Vec<Spanned<Value>>>>,
     /// Between these two, uniform.
-    #[schemars(with = "Option<[f64; 2]>")]
     pub uniform: Option<Spanned<[f64; 2]>>,
     /// Between these two, uniform in the logarithm.
-    #[schemars(with = "Option<[f64; 2]>")]
     pub log_uniform: Option<Spanned<[f64; 2]>>,
     /// Normal distribution between two bounds.
-    #[schemars(with = "Option<NormalInput>")]
     pub normal: Option<Spanned<NormalInput>>,
     /// In a `grid`: number of values, equally probable parts apart, with both ends.
-    #[schemars(with = "Option<usize>", extend("minimum" = 1))]
+    #[schemars(extend("minimum" = 1))]
     pub levels: Option<Spanned<usize>>,
     /// Whole numbers only.
     #[serde(default)]
@@ -164,15 +153,12 @@ pub struct NormalInput {
 #[serde(deny_unknown_fields)]
 pub struct OutputInput {
     /// Probe, or another column of `history.csv`.
-    #[schemars(with = "String")]
     pub probe: Spanned<String>,
     /// Which value; default `final`.
-    #[schemars(with = "Option<Take>")]
     pub take: Option<Spanned<Take>>,
     /// Its value where another probe first reaches a value, linear between increments.
     pub at: Option<AtInput>,
     /// Only in this phase.
-    #[schemars(with = "Option<String>")]
     pub phase: Option<Spanned<String>>,
 }
 
@@ -181,7 +167,6 @@ pub struct OutputInput {
 #[serde(deny_unknown_fields)]
 pub struct AtInput {
     /// That probe.
-    #[schemars(with = "String")]
     pub probe: Spanned<String>,
     /// That value.
     pub value: f64,

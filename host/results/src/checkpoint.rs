@@ -22,7 +22,7 @@ pub const FILE_NAME: &str = "checkpoint.bin";
 /// First bytes of the file: the format.
 const NAME: &[u8] = b"pilum checkpoint ";
 /// The same with its version.
-const HEAD: &[u8] = b"pilum checkpoint 13\n";
+const HEAD: &[u8] = b"pilum checkpoint 14\n";
 
 /// Bytes that are summed and written at a time, by two threads if there are two: few enough to stay in the processor's
 /// cache, and as long in work as waking a thread is worth.

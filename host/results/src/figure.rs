@@ -3,6 +3,7 @@
 
 mod mesh;
 
+use crate::ends;
 use crate::output_request::{Cut, Figure, Measured};
 use crate::pile::{State, Station};
 use crate::pressures::Pressure;
@@ -477,24 +478,20 @@ fn empty_corner(
         });
         of_curves || markers.any(|&(u, v)| inside(u, v))
     };
-    if !covered(true, false) {
-        Some(SeriesLabelPosition::LowerRight)
-    } else if !covered(true, true) {
-        Some(SeriesLabelPosition::UpperRight)
-    } else if !covered(false, true) {
-        Some(SeriesLabelPosition::UpperLeft)
-    } else if !covered(false, false) {
-        Some(SeriesLabelPosition::LowerLeft)
-    } else {
-        None
-    }
+    let corners = [
+        (true, false, SeriesLabelPosition::LowerRight),
+        (true, true, SeriesLabelPosition::UpperRight),
+        (false, true, SeriesLabelPosition::UpperLeft),
+        (false, false, SeriesLabelPosition::LowerLeft),
+    ];
+    let mut empty = corners.into_iter();
+    let empty = empty.find(|(right, upper, _)| !covered(*right, *upper));
+    empty.map(|(.., corner)| corner)
 }
 
 /// The range of some values, widened by a fraction of it; never empty.
 fn range(values: impl Iterator<Item = f64>, margin: f64) -> Range<f64> {
-    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
-        (low.min(v), high.max(v))
-    });
+    let [low, high] = ends(values);
     if !(low.is_finite() && high.is_finite()) {
         return 0.0..1.0;
     }

@@ -2,6 +2,7 @@
 //! only if they still hold what they held. Nothing is written through a link: what it leads to
 //! belongs to somebody else.
 
+use crc32fast::Hasher;
 use serde::{Deserialize, Serialize};
 use std::fs::{File, Metadata, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -28,54 +29,11 @@ fn has_other_names(metadata: &Metadata) -> bool {
     }
 }
 
-/// A sum by which damage is noticed: of two texts that differ in eight bytes or fewer in a row it
-/// always differs, of others but for one in 2⁶⁴. It costs next to nothing next to writing them.
-#[derive(Clone, Copy, Debug, Default)]
-struct Sum {
-    state: u64,
-    /// Bytes that do not fill a word yet.
-    rest: [u8; 8],
-    n: usize,
-}
-
-impl Sum {
-    /// One step: a bijection of the state for any word, and of the word for any state.
-    fn word(state: u64, word: [u8; 8]) -> u64 {
-        (state.rotate_left(23) ^ u64::from_le_bytes(word)).wrapping_mul(0x9e37_79b9_7f4a_7c15)
-    }
-
-    fn add(&mut self, mut bytes: &[u8]) {
-        if self.n > 0 {
-            let taken = bytes.len().min(8 - self.n);
-            self.rest[self.n..self.n + taken].copy_from_slice(&bytes[..taken]);
-            self.n += taken;
-            bytes = &bytes[taken..];
-            if self.n < 8 {
-                return;
-            }
-            self.state = Self::word(self.state, self.rest);
-            self.n = 0;
-        }
-        let (words, rest) = bytes.as_chunks::<8>();
-        for word in words {
-            self.state = Self::word(self.state, *word);
-        }
-        self.rest[..rest.len()].copy_from_slice(rest);
-        self.n = rest.len();
-    }
-
-    fn value(&self) -> u64 {
-        let mut last = [0; 8];
-        last[..self.n].copy_from_slice(&self.rest[..self.n]);
-        Self::word(self.state, last)
-    }
-}
-
-/// How much a file held, and its sum.
+/// How much a file held, and its CRC-32, by which damage is noticed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Extent {
     pub(crate) length: u64,
-    pub(crate) sum: u64,
+    pub(crate) sum: u32,
 }
 
 /// A file that is appended to.
@@ -86,7 +44,7 @@ pub(crate) struct Appended {
     own: Identity,
     /// Bytes of whole entries in the file, and their sum.
     length: u64,
-    sum: Sum,
+    sum: Hasher,
 }
 
 impl Appended {
@@ -140,7 +98,7 @@ impl Appended {
             own: identity(&file),
             file,
             length: 0,
-            sum: Sum::default(),
+            sum: Hasher::new(),
         }
     }
 
@@ -170,7 +128,7 @@ impl Appended {
     fn extent(&self) -> Extent {
         Extent {
             length: self.length,
-            sum: self.sum.value(),
+            sum: self.sum.clone().finalize(),
         }
     }
 
@@ -187,7 +145,7 @@ impl Appended {
             return Err(Error::unwritable(&self.path, error));
         }
         self.length += text.len() as u64;
-        self.sum.add(text);
+        self.sum.update(text);
         Ok(())
     }
 
@@ -224,13 +182,10 @@ fn lock(file: &File) -> io::Result<()> {
 /// # Errors
 /// [`Error::Unreadable`]; [`Error::Usage`] if it does not.
 pub(crate) fn check(path: &Path, extent: Extent) -> Result<(), Error> {
-    let unreadable = |source| Error::Unreadable {
-        path: path.to_owned(),
-        source,
-    };
+    let unreadable = |why| Error::unreadable(path, why);
     let mut file = text::file::open_regular(path).map_err(unreadable)?;
     let sum = sum_of(&mut file, extent.length).map_err(unreadable)?;
-    if sum.value() == extent.sum {
+    if sum.finalize() == extent.sum {
         Ok(())
     } else {
         Err(changed(path))
@@ -249,20 +204,20 @@ pub(crate) fn check_length(path: &Path, length: u64) -> Result<(), Error> {
 }
 
 /// The sum of the first bytes of a file; of all if there are fewer.
-fn sum_of(file: &mut File, length: u64) -> io::Result<Sum> {
+fn sum_of(file: &mut File, length: u64) -> io::Result<Hasher> {
     file.seek(SeekFrom::Start(0))?;
-    let mut sum = Sum::default();
+    let mut sum = Hasher::new();
     let mut piece = vec![0; PIECE];
     let mut left = length;
     while left > 0 {
         let most = left.min(PIECE as u64) as usize;
         let n = file.read(&mut piece[..most])?;
         if n == 0 {
-            // Not even the remainder of the sum is the same then.
-            sum.add(&[1]);
+            // The sum is another one then.
+            sum.update(&[1]);
             break;
         }
-        sum.add(&piece[..n]);
+        sum.update(&piece[..n]);
         left -= n as u64;
     }
     Ok(sum)
@@ -288,34 +243,4 @@ fn changed(path: &Path) -> Error {
          without --resume to start anew",
         path.display()
     ))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_sum_does_not_depend_on_the_pieces_and_notices_every_byte() {
-        let text: Vec<u8> = (0..100_u8).map(|i| i.wrapping_mul(37)).collect();
-        let of = |pieces: &[&[u8]]| {
-            let mut sum = Sum::default();
-            for piece in pieces {
-                sum.add(piece);
-            }
-            sum.value()
-        };
-        let whole = of(&[&text]);
-        for at in 0..text.len() {
-            let (a, b) = text.split_at(at);
-            assert_eq!(of(&[a, b]), whole, "{at}");
-            let (b, c) = b.split_at(b.len().min(3));
-            assert_eq!(of(&[a, b, c]), whole, "{at}");
-            let mut other = text.clone();
-            other[at] ^= 1;
-            assert_ne!(of(&[&other]), whole, "{at}");
-        }
-        let mut exchanged = text.clone();
-        exchanged.swap(8, 16);
-        assert_ne!(of(&[&exchanged]), whole);
-    }
 }

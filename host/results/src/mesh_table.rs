@@ -1,5 +1,6 @@
 //! Elements, groups, lines and shapes of a mesh as text.
 
+use crate::ends;
 use mechanics::mesh::{Line, Mesh, Solid};
 use mechanics::problem::{Analysis, Axis};
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -135,9 +136,7 @@ impl MeshTable {
     fn extent(&self) -> String {
         let axes = [Axis::X, Axis::Y].into_iter().enumerate();
         let parts = axes.map(|(c, axis)| {
-            let at = self.mesh.nodes.iter().map(|node| node[c]);
-            let low = at.clone().fold(f64::INFINITY, f64::min);
-            let high = at.fold(f64::NEG_INFINITY, f64::max);
+            let [low, high] = ends(self.mesh.nodes.iter().map(|node| node[c]));
             let name = axis.name(self.analysis);
             format!("{name} {} to {}", short(low), short(high))
         });

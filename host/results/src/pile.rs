@@ -216,27 +216,18 @@ struct Held<'g> {
     forces: [f64; 3],
 }
 
-/// What acts on groups from outside (1), and the weight of each, downward, kN.
-fn external(
-    snapshot: &Snapshot<'_>,
-    there: &[usize],
-    n_dofs: usize,
-) -> (Vec<f64>, Vec<(usize, f64)>) {
-    let mut outer = vec![0.0; n_dofs];
-    let mut weights = Vec::new();
-    for &number in there {
-        let group = &snapshot.groups[number];
-        let weight = snapshot.acting.weight_of(number, snapshot.problem, group);
-        let pores = snapshot
-            .acting
-            .pore_forces_of(number, snapshot.problem, group);
-        let forces = group.forces(n_dofs).into_iter().zip(pores).zip(&weight);
-        for (outer, ((force, pore), weight)) in outer.iter_mut().zip(forces) {
-            *outer += force - pore - weight;
-        }
-        weights.push((number, -weight.iter().skip(1).step_by(2).sum::<f64>()));
+/// Adds what acts on a group from outside, kN by degree of freedom; gives its weight, downward, kN.
+fn add_external(snapshot: &Snapshot<'_>, number: usize, outer: &mut [f64]) -> f64 {
+    let group = &snapshot.groups[number];
+    let weight = snapshot.acting.weight_of(number, snapshot.problem, group);
+    let pores = snapshot
+        .acting
+        .pore_forces_of(number, snapshot.problem, group);
+    let forces = group.forces(outer.len()).into_iter().zip(pores);
+    for (outer, ((force, pore), weight)) in outer.iter_mut().zip(forces.zip(&weight)) {
+        *outer += force - pore - weight;
     }
-    (outer, weights)
+    -weight.iter().skip(1).step_by(2).sum::<f64>()
 }
 
 impl Pile {
@@ -331,9 +322,11 @@ impl Pile {
     /// The outer forces on those of its groups that are there, divided, and the weights of these.
     fn split(&self, snapshot: &Snapshot<'_>, there: &[usize]) -> (Split<'_>, Vec<(usize, f64)>) {
         let n_dofs = 2 * snapshot.problem.mesh.nodes.len();
-        let (outer, weights) = external(snapshot, there, n_dofs);
+        let mut outer = vec![0.0; n_dofs];
+        let external = |&group: &usize| (group, add_external(snapshot, group, &mut outer));
+        let weights = there.iter().map(external).collect();
         let mut held = Self::held(snapshot, &self.geometry.shaft, n_dofs);
-        self.take_from_ground(snapshot, &mut held, n_dofs);
+        self.take_from_ground(snapshot, &mut held);
         let outer = |node: usize| outer[2 * node + 1];
         (Split::new(&self.geometry, &held, outer), weights)
     }
@@ -474,7 +467,7 @@ impl Pile {
 
     /// If an absent interface begins at the head, its faces move as one. The force of the ground on
     /// the pile there follows from the ground's own forces.
-    fn take_from_ground(&self, snapshot: &Snapshot<'_>, held: &mut [Held<'_>], n_dofs: usize) {
+    fn take_from_ground(&self, snapshot: &Snapshot<'_>, held: &mut [Held<'_>]) {
         let head = &self.geometry.head;
         let mut taken: Option<Vec<f64>> = None;
         for Held { facet, forces } in held {
@@ -486,7 +479,7 @@ impl Pile {
             };
             for (i, node) in facet.nodes.iter().enumerate() {
                 if head.contains(node) {
-                    let outer = taken.get_or_insert_with(|| self.outer_of_ground(snapshot, n_dofs));
+                    let outer = taken.get_or_insert_with(|| self.outer_of_ground(snapshot));
                     forces[i] = -outer[2 * opposite[i] + 1];
                 }
             }
@@ -495,7 +488,7 @@ impl Pile {
 
     /// What the pile exerts on all other solids, and what holds them, by degree of freedom: all that acts on
     /// them from outside, less what acts on lines and as water on the outline.
-    fn outer_of_ground(&self, snapshot: &Snapshot<'_>, n_dofs: usize) -> Vec<f64> {
+    fn outer_of_ground(&self, snapshot: &Snapshot<'_>) -> Vec<f64> {
         let outline = snapshot.acting.on_outline(snapshot.problem);
         let mut outer: Vec<f64> = outline.iter().map(|force| -force).collect();
         for (number, group) in snapshot.groups.iter().enumerate() {
@@ -503,14 +496,7 @@ impl Pile {
             if !group.is_active || is_joint || self.parts.groups.contains(&number) {
                 continue;
             }
-            let weight = snapshot.acting.weight_of(number, snapshot.problem, group);
-            let pores = snapshot
-                .acting
-                .pore_forces_of(number, snapshot.problem, group);
-            let forces = group.forces(n_dofs).into_iter().zip(pores).zip(weight);
-            for (outer, ((force, pore), weight)) in outer.iter_mut().zip(forces) {
-                *outer += force - pore - weight;
-            }
+            add_external(snapshot, number, &mut outer);
         }
         outer
     }

@@ -46,10 +46,11 @@ fn internal(why: impl Display) -> Error {
 /// A page from its template.
 fn filled(template: &str, page: minijinja::Value) -> Result<String, Error> {
     let mut environment = minijinja::Environment::new();
+    environment.add_filter("words", page::words);
+    environment.add_filter("display", number_format::display);
+    environment.add_filter("seconds", page::seconds);
     environment
-        .add_template(FILE, template)
-        .and_then(|()| environment.get_template(FILE))
-        .and_then(|template| template.render(page))
+        .render_named_str(FILE, template, page)
         .map_err(|error| internal(format!("{error:#}")))
 }
 

@@ -8,8 +8,8 @@ use crate::summary::{
 use crate::table::comma_separated;
 use indexmap::{IndexMap, IndexSet};
 use serde_json::{Value, json};
+use std::io;
 use std::path::{Path, PathBuf};
-use std::{io, iter};
 use text::Error;
 
 /// Columns of the resistances of piles.
@@ -47,7 +47,7 @@ pub fn of(folders: &[PathBuf]) -> Result<String, Error> {
         if found.len() == before {
             let why = "there is no run in this folder, nor in those below";
             let why = io::Error::new(io::ErrorKind::NotFound, why);
-            return Err(unreadable(&folder.join(FILE_NAME), why));
+            return Err(Error::unreadable(&folder.join(FILE_NAME), why));
         }
     }
     let mut seen = IndexSet::new();
@@ -134,14 +134,7 @@ fn of_study(folder: &Path) -> Result<String, Error> {
         cells.push(row.standing.reason.clone());
         cells
     });
-    comma_separated(iter::once(header.map(str::to_owned).collect()).chain(body))
-}
-
-fn unreadable(path: &Path, source: io::Error) -> Error {
-    Error::Unreadable {
-        path: path.to_owned(),
-        source,
-    }
+    comma_separated(header, body)
 }
 
 /// The folders of runs at or below this one, in the order of their names.
@@ -150,7 +143,7 @@ fn find(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), Error> {
         found.push(folder.to_owned());
         return Ok(());
     }
-    let wrong = |why| unreadable(folder, why);
+    let wrong = |why| Error::unreadable(folder, why);
     let mut below = Vec::new();
     for entry in folder.read_dir().map_err(wrong)? {
         let entry = entry.map_err(wrong)?;
@@ -226,7 +219,7 @@ fn written(names: &[String], runs: &[Run]) -> Result<String, Error> {
     let probes: IndexSet<&str> = probes.map(String::as_str).collect();
     let of_pile = columns_of_pile(runs.iter().map(|run| &run.summary));
     let header = ["run", "status"].iter().chain(&settings).chain(&probes);
-    let header = header.chain(of_pile).map(ToString::to_string).collect();
+    let header = header.chain(of_pile);
     let body = names.iter().zip(runs).map(|(name, run)| {
         let mut row = vec![name.clone(), run.status().to_owned()];
         let of_settings = settings.iter().map(|path| run.settings.get(*path));
@@ -236,7 +229,7 @@ fn written(names: &[String], runs: &[Run]) -> Result<String, Error> {
         row.extend(cells_of_pile(run.summary.pile.as_ref(), of_pile));
         row
     });
-    comma_separated(iter::once(header).chain(body))
+    comma_separated(header, body)
 }
 
 /// A value in a cell; nothing, where absent. A number has all its digits.

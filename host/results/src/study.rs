@@ -18,8 +18,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, TryLockError};
+use std::io;
 use std::path::{Path, PathBuf};
-use std::{io, iter};
 use text::Error;
 use text::write::replace_whole;
 
@@ -373,10 +373,8 @@ impl Record {
     /// [`Error::Unreadable`]; [`Error::Usage`] if a study has not written it.
     pub fn read(folder: &Path) -> Result<Self, Error> {
         let path = folder.join(RECORD);
-        let text = std::fs::read_to_string(&path).map_err(|source| Error::Unreadable {
-            path: path.clone(),
-            source,
-        })?;
+        let text = std::fs::read_to_string(&path);
+        let text = text.map_err(|why| Error::unreadable(&path, why))?;
         serde_json::from_str(&text).map_err(|error| not_ours(&path, &error))
     }
 
@@ -405,7 +403,7 @@ impl Record {
             cells.push(row.standing.reason.clone());
             cells
         });
-        let table = comma_separated(iter::once(self.columns()).chain(body))?;
+        let table = comma_separated(self.columns(), body)?;
         replace_whole(&path, table)
     }
 
@@ -446,10 +444,7 @@ impl Record {
     /// [`Error::Unreadable`]; [`Error::Usage`] if a study has not written it.
     pub fn read_table(&self, folder: &Path) -> Result<Vec<Row>, Error> {
         let path = folder.join(TABLE);
-        let text = std::fs::read(&path).map_err(|source| Error::Unreadable {
-            path: path.clone(),
-            source,
-        })?;
+        let text = std::fs::read(&path).map_err(|why| Error::unreadable(&path, why))?;
         let mut rows = Vec::new();
         let (n, m) = (self.parameters.len(), self.outputs.len());
         for record in csv::Reader::from_reader(text.as_slice()).records() {

@@ -416,10 +416,8 @@ impl Summary {
     /// [`Error::Unreadable`]; [`Error::Input`] if it is not one that a run has written.
     pub fn read(folder: &Path) -> Result<Self, Error> {
         let path = folder.join(FILE_NAME);
-        let text = std::fs::read_to_string(&path).map_err(|source| Error::Unreadable {
-            path: path.clone(),
-            source,
-        })?;
+        let text = std::fs::read_to_string(&path);
+        let text = text.map_err(|why| Error::unreadable(&path, why))?;
         let summary: Self = serde_json::from_str(&text).map_err(|error| {
             let lines = text.split_inclusive('\n').take(error.line().max(1) - 1);
             let at = lines.map(str::len).sum::<usize>() + error.column().max(1) - 1;
@@ -463,10 +461,8 @@ pub fn end_summary(folder: &Path, ending: &Ending) -> Result<bool, Error> {
     if !path.is_file() {
         return Ok(false);
     }
-    let text = std::fs::read_to_string(&path).map_err(|source| Error::Unreadable {
-        path: path.clone(),
-        source,
-    })?;
+    let text = std::fs::read_to_string(&path);
+    let text = text.map_err(|why| Error::unreadable(&path, why))?;
     let Ok(mut summary) = serde_json::from_str::<Ended>(&text) else {
         return Ok(false);
     };

@@ -216,13 +216,17 @@ impl Table {
     }
 }
 
-/// Rows, the names of the columns first, as comma-separated values.
-pub(crate) fn comma_separated<Row>(rows: impl IntoIterator<Item = Row>) -> Result<String, Error>
-where
-    Row: IntoIterator<Item: AsRef<[u8]>>,
-{
+/// A table as comma-separated values, from the names of its columns and its rows.
+///
+/// # Errors
+/// A row has another number of cells.
+pub fn comma_separated(
+    columns: impl IntoIterator<Item: AsRef<[u8]>>,
+    rows: impl IntoIterator<Item = Vec<String>>,
+) -> Result<String, Error> {
     let table = || -> Result<String, Box<dyn std::error::Error>> {
         let mut table = csv::Writer::from_writer(Vec::new());
+        table.write_record(columns)?;
         for row in rows {
             table.write_record(row)?;
         }

@@ -47,7 +47,7 @@ use parameter_block::block;
 use propagation::Errors;
 use stage::last_stage;
 use std::path::{Path, PathBuf};
-use toml::Spanned;
+use text::Spanned;
 
 /// Settings of a calibration.
 #[derive(Clone, Debug)]

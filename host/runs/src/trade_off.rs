@@ -23,7 +23,7 @@ pub use accuracy::{reach_until, run_accurately};
 use crate::Error;
 use crate::experiment::{Counts, write};
 use crate::variants::{folder, keep, of_variant};
-use input::{Case, Driver, is_driver};
+use input::{Case, Driver, file_in, is_driver};
 use law::{Opener, Stop};
 use std::path::{Path, PathBuf};
 use study::Study;
@@ -76,11 +76,7 @@ pub fn run(
             "--resume goes on with a study of settings, not with --interface-stiffness",
         );
     }
-    let path = if path.is_dir() {
-        path.join("case.toml")
-    } else {
-        path.to_owned()
-    };
+    let path = file_in(path, "case");
     if !is_driver(&path)? {
         return run_cases(&path, options, show, say);
     }

@@ -44,8 +44,7 @@ fn refuse(table: &MeshTable, path: &Path) -> Result<(), Error> {
         return Ok(());
     };
     let source = io::Error::new(io::ErrorKind::InvalidData, why);
-    let path = path.to_owned();
-    Err(text::Error::Unreadable { path, source }.into())
+    Err(text::Error::unreadable(path, source).into())
 }
 
 fn tables(asked: &Mesh) -> Result<Vec<MeshTable>, Error> {

@@ -8,7 +8,6 @@ use crate::threads;
 use indicatif::{ProgressBar, ProgressStyle};
 use input::Error;
 use law::{Opener, Stop};
-use mechanics::Place;
 use results::study::{Row, State};
 use runs::run::Observer;
 use runs::study::{Event, Jobs, Once, Plan, carry_out, run_one, stop_of_worker};
@@ -84,12 +83,6 @@ fn arguments(opener: &Opener, asked: &Study) -> Vec<std::ffi::OsString> {
 struct Quiet(Stop);
 
 impl Observer for Quiet {
-    fn phase(&mut self, _name: &str, _increments: usize) {}
-
-    fn increment(&mut self, _place: &Place, _of: usize, _iterations: usize) {}
-
-    fn cut_back(&mut self, _place: &Place, _reason: &str) {}
-
     fn warning(&mut self, message: &str) {
         say!("warning: {message}");
     }

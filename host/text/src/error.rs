@@ -59,6 +59,14 @@ impl Error {
         }
     }
 
+    /// A file cannot be read.
+    pub fn unreadable(path: &Path, source: std::io::Error) -> Self {
+        Self::Unreadable {
+            path: path.to_owned(),
+            source,
+        }
+    }
+
     /// A hint for the user, if one is known.
     pub fn help(&self) -> Option<&str> {
         match self {

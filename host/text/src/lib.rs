@@ -12,6 +12,7 @@ mod misfit;
 mod read;
 mod setting;
 mod source;
+mod spanned;
 mod suggest;
 mod syntax;
 mod value;
@@ -22,6 +23,7 @@ pub use error_display::shown;
 pub use read::{Named, parse, parse_any_numbers};
 pub use setting::key;
 pub use source::{InputError, Line, Source};
+pub use spanned::Spanned;
 pub use suggest::{nearest, suggestion};
 
 /// A number with its noun: `1 quad`, `2 quads`.

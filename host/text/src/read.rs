@@ -63,7 +63,7 @@ fn refuse_infinite_in(
 }
 
 /// Values by name, each with the place of name and value.
-pub type Named<T> = IndexMap<Spanned<String>, Spanned<T>>;
+pub type Named<T> = IndexMap<crate::Spanned<String>, crate::Spanned<T>>;
 
 #[cfg(test)]
 mod tests {

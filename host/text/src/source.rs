@@ -1,13 +1,12 @@
 //! A text that a user wrote, and errors with their place in it.
 
 use crate::setting::{key_at, key_in_setting};
-use crate::{Error, file, suggestion};
+use crate::{Error, Spanned, file, suggestion};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::string::FromUtf8Error;
 use std::sync::Arc;
 use thiserror::Error;
-use toml::Spanned;
 
 /// An input file with the files it is based on, kept for messages that point into them.
 ///

@@ -23,8 +23,8 @@ pub(crate) fn case(source: Source) -> Result<Vec<Case>, Error> {
 /// Number of elements that a case asks for; of a mesh that is a file, which a text cannot be trusted to
 /// name, more than any.
 pub(crate) fn elements(case: &Case) -> usize {
-    let of = |parts: &Option<toml::Spanned<Vec<toml::Spanned<PartInput>>>>| {
-        let parts = parts.iter().flat_map(toml::Spanned::get_ref);
+    let of = |parts: &Option<text::Spanned<Vec<text::Spanned<PartInput>>>>| {
+        let parts = parts.iter().flat_map(text::Spanned::get_ref);
         parts.fold(0, |sum: usize, part| sum.saturating_add(part.get_ref().n))
     };
     let mesh = &case.file.mesh;

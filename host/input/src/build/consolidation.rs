@@ -6,7 +6,7 @@ use crate::case::{GroupInput, LawInput};
 use crate::ground::{Over, ProfileInput};
 use crate::material::{ParameterTable, ParameterValue};
 use mechanics::problem::Profile;
-use toml::Spanned;
+use text::Spanned;
 
 impl LawShelf<'_> {
     /// `ocr` and `pop` of the stress at rest of a group that its law declares and the case does not give the law.

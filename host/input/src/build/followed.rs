@@ -14,8 +14,7 @@ use mechanics::problem::{Formulation, Variation};
 use std::fmt;
 use std::ops::Range;
 use std::sync::Arc;
-use text::suggestion;
-use toml::Spanned;
+use text::{Spanned, suggestion};
 
 /// Parameters as a law is built with them, and the values of elements where these differ.
 type OfGroup = (ParameterTable, Vec<(String, Variation)>);
@@ -168,7 +167,7 @@ impl LawShelf<'_> {
             let message = format!("`{name}` follows from itself: {}", chain.join(" from "));
             return Err(wrong(&asked.by, message).into());
         }
-        let entry = self.law_named(law, asked)?;
+        let entry = self.entry(law, asked.by.clone())?;
         let loaded = self.kept(law, entry)?;
         let declared = self.declared(&loaded, law, id, asked)?;
         let table = self.tables().parameters(entry);
@@ -288,17 +287,6 @@ impl LawShelf<'_> {
             })
     }
 
-    fn law_named(&self, law: &str, asked: &Asked<'_>) -> Result<&LawInput, Without> {
-        let mut laws = self.file.laws.iter();
-        let found = laws.find(|(key, _)| key.get_ref() == law);
-        found.map(|(_, entry)| entry.get_ref()).ok_or_else(|| {
-            let names = self.file.laws.keys().map(|key| key.get_ref().as_str());
-            let message = format!("there is no law `{law}` under [laws]");
-            let error = self.source.error(asked.by.clone(), message);
-            error.hint(suggestion(law, names)).into()
-        })
-    }
-
     /// The law of a table, opened once.
     pub(super) fn kept(&self, law: &str, entry: &LawInput) -> Result<LoadedLaw, Error> {
         if let Some(loaded) = self.opened.borrow().get(law) {
@@ -313,7 +301,7 @@ impl LawShelf<'_> {
 
     /// The elastic operator of a law of ground at an element.
     fn elastic(&self, law: &str, asked: &Asked<'_>) -> Result<Vec<f64>, Without> {
-        let entry = self.law_named(law, asked)?;
+        let entry = self.entry(law, asked.by.clone())?;
         let (at, stress) = asked.place.ok_or(Without::Place)?;
         let loaded = self.kept(law, entry)?;
         let hypothesis = self.hypothesis_of_ground();

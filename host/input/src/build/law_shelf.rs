@@ -15,9 +15,9 @@ use mechanics::model;
 use mechanics::problem::{Formulation, Ground, Material, Variation, Water};
 use std::cell::RefCell;
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::Arc;
-use text::{Source, suggestion};
-use toml::Spanned;
+use text::{InputError, Source, Spanned, suggestion};
 
 /// Key of a law, and the bits of its parameters at a place.
 type LawAt = (String, Vec<u64>);
@@ -38,16 +38,12 @@ pub(super) struct LawShelf<'a> {
 
 impl<'a> LawShelf<'a> {
     /// What the file says under a law's name.
-    pub(super) fn entry(&self, name: &Spanned<String>) -> Result<&'a LawInput, Error> {
+    pub(super) fn entry(&self, name: &str, at: Range<usize>) -> Result<&'a LawInput, InputError> {
         let laws = &self.file.laws;
-        let entry = laws.iter().find(|(key, _)| key.get_ref() == name.get_ref());
-        entry.map(|(_, entry)| entry.get_ref()).ok_or_else(|| {
-            let names: Vec<&str> = laws.keys().map(|k| k.get_ref().as_str()).collect();
-            let message = format!("there is no law `{}` under [laws]", name.get_ref());
-            self.source
-                .error(name.span(), message)
-                .hint(suggestion(name.get_ref(), names))
-                .into()
+        laws.get(name).map(Spanned::get_ref).ok_or_else(|| {
+            let names = laws.keys().map(|key| key.get_ref().as_str());
+            let message = format!("there is no law `{name}` under [laws]");
+            self.source.error(at, message).hint(suggestion(name, names))
         })
     }
 
@@ -71,7 +67,7 @@ impl<'a> LawShelf<'a> {
         group: &GroupInput,
         name: &Spanned<String>,
     ) -> Result<Material, Error> {
-        let entry = self.entry(name)?;
+        let entry = self.entry(name.get_ref(), name.span())?;
         let is_interface_law = group.formulation == Formulation::ThinLayer
             && self.loaded(entry).is_ok_and(|law| {
                 let offered = law.description().formulation(Hypothesis::Interface2d);

@@ -5,8 +5,7 @@ use crate::case::{CaseFile, DirectedStrain, PhaseInput, StrainInput};
 use crate::ground::level;
 use crate::spanned::Given;
 use mechanics::problem::{Analysis, Displacement, Force, Free, Phase, Pressure, Until};
-use text::{Named, Source};
-use toml::Spanned;
+use text::{Named, Source, Spanned};
 
 /// A phase without its laws.
 pub(super) fn phase(source: &Source, file: &CaseFile, input: &PhaseInput) -> Result<Phase, Error> {

@@ -7,7 +7,7 @@ use abi::status::Outcome;
 use mechanics::check::{Cause, Item, Key, Refusal};
 use mechanics::group::PointFailure;
 use std::ops::Range;
-use toml::Spanned;
+use text::Spanned;
 
 impl Case {
     /// An error of the case's problem or simulation, at its place in the file where it has one.

@@ -9,7 +9,7 @@ use crate::material::{given, no_internal_variable, place_failure, try_law};
 use abi::Hypothesis;
 use law::{BuildCause, BuildFailure, LoadedLaw};
 use std::collections::BTreeSet;
-use toml::Spanned;
+use text::Spanned;
 
 /// How closely laws that nothing takes are looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,37 +4,30 @@ use super::one;
 use crate::schema;
 use schemars::JsonSchema;
 use serde::Deserialize;
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
-use text::Named;
-use toml::Spanned;
+use text::{Named, Spanned};
 
 /// A mesh: a grid of 8-node quads, or a file of Gmsh.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeshInput {
     /// Instead of a grid: a file of Gmsh, relative to the case file.
-    #[schemars(with = "Option<PathBuf>")]
     pub file: Option<Spanned<PathBuf>>,
     /// Metres in a unit of that file; default 1.
-    #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0))]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub scale: Option<Spanned<f64>>,
     /// Start of columns and rows; default (0, 0).
-    #[schemars(with = "Option<[f64; 2]>")]
     pub origin: Option<Spanned<[f64; 2]>>,
     /// Columns, in the direction of x (r).
-    #[schemars(with = "Option<Vec<PartInput>>")]
     pub columns: Option<Spanned<Vec<Spanned<PartInput>>>>,
     /// Rows, in the direction of y (z).
-    #[schemars(with = "Option<Vec<PartInput>>")]
     pub rows: Option<Spanned<Vec<Spanned<PartInput>>>>,
     /// Groups of elements; later regions override earlier ones.
     #[serde(default, rename = "region")]
     pub regions: Vec<RegionInput>,
     /// Named lines.
     #[serde(default)]
-    #[schemars(with = "BTreeMap<String, LineInput>")]
     pub lines: Named<LineInput>,
     /// How often each element of the file is divided into four.
     #[serde(skip)]
@@ -63,15 +56,12 @@ pub struct PartInput {
 #[serde(deny_unknown_fields)]
 pub struct RegionInput {
     /// Group of the elements.
-    #[schemars(with = "String")]
     pub group: Spanned<String>,
     /// Extent in x (r); default: all.
     #[serde(alias = "r")]
-    #[schemars(with = "Option<[f64; 2]>")]
     pub x: Option<Spanned<[f64; 2]>>,
     /// Extent in y (z); default: all.
     #[serde(alias = "z")]
-    #[schemars(with = "Option<[f64; 2]>")]
     pub y: Option<Spanned<[f64; 2]>>,
 }
 

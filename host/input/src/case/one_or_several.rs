@@ -5,7 +5,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Deserializer, de};
 use std::borrow::Cow;
 use std::fmt;
-use toml::Spanned;
+use text::Spanned;
 
 /// Names of groups: one, or a list.
 #[derive(Clone, Debug)]

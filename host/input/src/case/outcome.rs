@@ -5,10 +5,8 @@ use crate::schema;
 use results::output_request::Reduce;
 use schemars::JsonSchema;
 use serde::Deserialize;
-use std::collections::BTreeMap;
 use std::path::PathBuf;
-use text::Named;
-use toml::Spanned;
+use text::{Named, Spanned};
 
 /// A quantity written for every increment.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
@@ -16,14 +14,11 @@ use toml::Spanned;
 #[serde(deny_unknown_fields)]
 pub struct ProbeInput {
     /// Line of nodes.
-    #[schemars(with = "Option<String>")]
     pub line: Option<Spanned<String>>,
     /// Group of integration points; with a line, its forces.
-    #[schemars(with = "Option<String>")]
     pub group: Option<Spanned<String>>,
     /// On a line `displacement_…`, `reaction_…`, with a group `force_…`. In a group a stress, strain,
     /// traction, jump, internal variable, `pore_pressure`, `excess_pore_pressure` or `total_stress_…`.
-    #[schemars(with = "Option<String>")]
     pub quantity: Option<Spanned<String>>,
     /// How values become one; default `sum` for forces, else `mean`.
     pub reduce: Option<Reduce>,
@@ -37,7 +32,6 @@ pub struct ProbeInput {
     #[serde(default = "one")]
     pub scale: f64,
     /// Instead: a sum of earlier probes with factors.
-    #[schemars(with = "Option<BTreeMap<String, f64>>")]
     pub combine: Option<Named<f64>>,
 }
 
@@ -50,14 +44,12 @@ pub struct PileInput {
     /// Interface groups of its shaft, from head to toe.
     pub shaft: GroupNames,
     /// Base: an interface group, or its line on the ground.
-    #[schemars(with = "String")]
     pub base: Spanned<String>,
     /// Line of its head.
-    #[schemars(with = "String")]
     pub head: Spanned<String>,
     /// Diameter (plane strain: width) for its resistance, m; default: twice the largest radius of the
     /// base, in plane strain its extent in x.
-    #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0))]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub diameter: Option<Spanned<f64>>,
 }
 
@@ -77,17 +69,14 @@ impl PileInput {
 #[serde(deny_unknown_fields)]
 pub struct FigureInput {
     /// Name of the file, without `.svg`.
-    #[schemars(with = "String")]
     pub name: Spanned<String>,
     /// Title; default: the case's.
     pub title: Option<String>,
     /// Horizontal axis: probe, quantity of a point, or column of `pile.csv`.
-    #[schemars(with = "String")]
     pub x: Spanned<String>,
     /// Text of this axis.
     pub x_label: Option<String>,
     /// Vertical axis: the same, one or more.
-    #[schemars(with = "Vec<String>")]
     pub y: Vec<Spanned<String>>,
     /// Text of this axis.
     pub y_label: Option<String>,
@@ -95,12 +84,10 @@ pub struct FigureInput {
     #[serde(default)]
     pub y_reversed: bool,
     /// Only this phase; default: all.
-    #[schemars(with = "Option<String>")]
     pub phase: Option<Spanned<String>>,
     /// Integration points of a cut, instead of probes.
     pub points: Option<CutInput>,
     /// Along the pile, instead of probes.
-    #[schemars(with = "Option<AlongInput>")]
     pub along_pile: Option<Spanned<AlongInput>>,
     /// Measured points, as markers.
     pub measured: Option<MeasuredTables>,
@@ -121,7 +108,6 @@ impl FigureInput {
 #[serde(deny_unknown_fields)]
 pub struct CutInput {
     /// Group; default: all.
-    #[schemars(with = "Option<String>")]
     pub group: Option<Spanned<String>>,
     /// Extent in x (r).
     #[serde(alias = "r")]
@@ -152,13 +138,10 @@ pub struct AlongInput {
 pub struct MeasuredInput {
     /// The file, relative to this one. Columns named in the first line, separated by `,`, `;` or tabs;
     /// lines with `#` and rows without a value do not count.
-    #[schemars(with = "PathBuf")]
     pub file: Spanned<PathBuf>,
     /// Column for the horizontal axis.
-    #[schemars(with = "String")]
     pub x: Spanned<String>,
     /// Column for the vertical axis.
-    #[schemars(with = "String")]
     pub y: Spanned<String>,
     /// Name in the legend.
     #[serde(default = "measured")]

@@ -6,65 +6,51 @@ use crate::schema;
 use mechanics::problem::Drainage;
 use schemars::JsonSchema;
 use serde::Deserialize;
-use std::collections::BTreeMap;
-use text::Named;
-use toml::Spanned;
+use text::{Named, Spanned};
 
 /// A loading phase. Loads and prescribed displacements stay until a later phase changes them.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PhaseInput {
     /// Name, used in results.
-    #[schemars(with = "String")]
     pub name: Spanned<String>,
     /// Number of equal increments.
-    #[schemars(with = "usize")]
     pub increments: Spanned<usize>,
     /// Duration, in the laws' unit of time; default 1.
-    #[schemars(with = "Option<f64>", extend("exclusiveMinimum" = 0))]
+    #[schemars(extend("exclusiveMinimum" = 0))]
     pub time: Option<Spanned<f64>>,
     /// Laws of groups from this phase on.
     #[serde(default)]
-    #[schemars(with = "BTreeMap<String, String>")]
     pub laws: Named<String>,
     /// Groups present from this phase on: solids free of stress, interfaces with the adjacent stress.
     #[serde(default)]
-    #[schemars(with = "Vec<String>")]
     pub activate: Vec<Spanned<String>>,
     /// Groups absent from this phase on, one at least stays: the phase releases their forces. Name the
     /// interfaces of removed ground, too.
     #[serde(default)]
-    #[schemars(with = "Vec<String>")]
     pub deactivate: Vec<Spanned<String>>,
     /// Unit weights of groups at its end, above and below the water, kN/m³.
     #[serde(default)]
-    #[schemars(with = "BTreeMap<String, f64>")]
     pub unit_weight: Named<f64>,
     /// Water table at its end.
-    #[schemars(with = "Option<WaterChange>")]
     pub water: Option<Spanned<WaterChange>>,
     /// Drainage of groups from this phase on. Excess pressure of drained groups goes in the course of
     /// the phase.
     #[serde(default)]
-    #[schemars(with = "BTreeMap<String, Drainage>")]
     pub drainage: Named<Drainage>,
     /// Lines whose nodes move alike, without turning, in this and all later phases; not radially if a
     /// line reaches the axis.
     #[serde(default)]
-    #[schemars(with = "Vec<String>")]
     pub rigid: Vec<Spanned<String>>,
     /// Pairs of the share of its time (0 to 1) and the factor on its changes; default: straight from 0
     /// to 1.
-    #[schemars(with = "Option<Vec<[f64; 2]>>")]
     pub course: Option<Spanned<Vec<[f64; 2]>>>,
     /// It ends before that where a quantity reaches a value. Loads, displacements and the excess pore
     /// pressure that `drainage` leaves stay where they are then.
-    #[schemars(with = "Option<UntilInput>")]
     pub until: Option<Spanned<UntilInput>>,
     /// Stress-free strains of groups at its end, expansion positive, since the start: heat, swelling,
     /// shrinkage.
     #[serde(default)]
-    #[schemars(with = "BTreeMap<String, StrainInput>")]
     pub strain: Named<StrainInput>,
     /// Forces at its end.
     #[serde(default)]
@@ -88,7 +74,6 @@ pub struct PhaseInput {
 #[serde(deny_unknown_fields)]
 pub struct UntilInput {
     /// Probe, or column of the pile in `history.csv`.
-    #[schemars(with = "String")]
     pub quantity: Spanned<String>,
     /// The value that ends the phase, from whichever side it is reached.
     pub reaches: f64,
@@ -130,7 +115,6 @@ pub struct DirectedStrain {
 #[serde(deny_unknown_fields)]
 pub struct DisplacementInput {
     /// The line.
-    #[schemars(with = "String")]
     pub line: Spanned<String>,
     /// In x (r).
     #[serde(alias = "r")]
@@ -145,7 +129,6 @@ pub struct DisplacementInput {
 #[serde(deny_unknown_fields)]
 pub struct FreeInput {
     /// The line.
-    #[schemars(with = "String")]
     pub line: Spanned<String>,
     /// The components.
     pub components: Vec<Axis>,
@@ -156,10 +139,8 @@ pub struct FreeInput {
 #[serde(deny_unknown_fields)]
 pub struct PressureInput {
     /// The line.
-    #[schemars(with = "String")]
     pub line: Spanned<String>,
     /// Positive towards the body, kPa.
-    #[schemars(with = "ProfileInput")]
     pub value: Spanned<ProfileInput>,
 }
 
@@ -170,7 +151,6 @@ pub struct PressureInput {
 #[serde(deny_unknown_fields)]
 pub struct ForceInput {
     /// The line.
-    #[schemars(with = "String")]
     pub line: Spanned<String>,
     /// In x (r).
     #[serde(alias = "r")]

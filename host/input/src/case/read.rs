@@ -4,8 +4,7 @@ use super::CaseFile;
 use crate::{Error, file_in, name_of};
 use law::Opener;
 use std::path::{Path, PathBuf};
-use text::{Source, base};
-use toml::Spanned;
+use text::{Source, Spanned, base};
 
 /// What a driver file looks like among case files.
 const DRIVER: base::OtherKind = base::OtherKind {

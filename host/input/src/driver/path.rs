@@ -6,25 +6,13 @@ use abi::Hypothesis;
 use law::words;
 use point::{Control, MAX_INCREMENTS, Misuse, N_MAX, Segment, Vector};
 use std::ops::Range;
-use text::{Source, suggestion};
-use toml::Spanned;
+use text::{Source, Spanned};
 
 pub(super) fn hypothesis(source: &Source, name: &Spanned<String>) -> Result<Hypothesis, Error> {
-    Hypothesis::ALL
-        .into_iter()
-        .find(|h| h.name() == name.get_ref())
-        .ok_or_else(|| {
-            source
-                .error(
-                    name.span(),
-                    format!("there is no hypothesis `{}`", name.get_ref()),
-                )
-                .hint(suggestion(
-                    name.get_ref(),
-                    Hypothesis::ALL.map(Hypothesis::name),
-                ))
-                .into()
-        })
+    let mut all = Hypothesis::ALL.into_iter();
+    let found = all.find(|h| h.name() == name.get_ref());
+    let names = Hypothesis::ALL.map(Hypothesis::name);
+    found.ok_or_else(|| source.unknown("hypothesis", name, names).into())
 }
 
 pub(super) fn finite(source: &Source, what: &str, value: &Spanned<f64>) -> Result<f64, Error> {

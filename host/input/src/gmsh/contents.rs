@@ -68,25 +68,13 @@ struct Sets {
 }
 
 impl<'a> Contents<'a> {
-    /// Reads a file.
+    /// Reads a file; or what arrays were written as.
     ///
     /// # Errors
-    /// The defect, and its place.
-    pub(super) fn read(bytes: &'a [u8]) -> Result<Self, Fault> {
-        Self::read_by(Cursor::new(bytes))
-    }
-
-    /// Reads what arrays were written as.
-    ///
-    /// # Errors
-    /// Their defects, by row.
-    pub(super) fn read_arrays(bytes: &'a [u8]) -> Result<Self, Fault> {
+    /// The defect, and its place; those of arrays by row.
+    pub(super) fn read(bytes: &'a [u8], is_of_arrays: bool) -> Result<Self, Fault> {
         let mut cursor = Cursor::new(bytes);
-        cursor.is_of_arrays = true;
-        Self::read_by(cursor)
-    }
-
-    fn read_by(mut cursor: Cursor<'a>) -> Result<Self, Fault> {
+        cursor.is_of_arrays = is_of_arrays;
         let version = format::read(&mut cursor)?;
         let mut reader = Reader {
             contents: Self {

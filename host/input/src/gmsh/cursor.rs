@@ -189,25 +189,25 @@ impl<'a> Cursor<'a> {
         parsed.map_err(|_| self.not_that(at, token.as_bytes(), what))
     }
 
+    /// The next bytes, the least significant one first.
     fn taken<const N: usize>(&mut self, what: &str) -> Result<[u8; N], Fault> {
         let Some((taken, _)) = self.rest().split_first_chunk::<N>() else {
             let at = self.bytes.len();
             return Err(self.fault(at, &format!("the file ends here, expected {what}")));
         };
         self.at += N;
-        Ok(*taken)
+        let mut taken = *taken;
+        if self.encoding == (Encoding::Binary { big_endian: true }) {
+            taken.reverse();
+        }
+        Ok(taken)
     }
 
     /// A whole number.
     pub(super) fn integer(&mut self, what: &str) -> Result<i64, Fault> {
         match self.encoding {
             Encoding::Text => self.parsed(what),
-            Encoding::Binary { big_endian: true } => {
-                Ok(i32::from_be_bytes(self.taken(what)?).into())
-            }
-            Encoding::Binary { big_endian: false } => {
-                Ok(i32::from_le_bytes(self.taken(what)?).into())
-            }
+            Encoding::Binary { .. } => Ok(i32::from_le_bytes(self.taken(what)?).into()),
         }
     }
 
@@ -215,8 +215,7 @@ impl<'a> Cursor<'a> {
     pub(super) fn size(&mut self, what: &str) -> Result<u64, Fault> {
         match self.encoding {
             Encoding::Text => self.parsed(what),
-            Encoding::Binary { big_endian: true } => Ok(u64::from_be_bytes(self.taken(what)?)),
-            Encoding::Binary { big_endian: false } => Ok(u64::from_le_bytes(self.taken(what)?)),
+            Encoding::Binary { .. } => Ok(u64::from_le_bytes(self.taken(what)?)),
         }
     }
 
@@ -268,8 +267,7 @@ impl<'a> Cursor<'a> {
     pub(super) fn real(&mut self, what: &str) -> Result<f64, Fault> {
         match self.encoding {
             Encoding::Text => self.parsed(what),
-            Encoding::Binary { big_endian: true } => Ok(f64::from_be_bytes(self.taken(what)?)),
-            Encoding::Binary { big_endian: false } => Ok(f64::from_le_bytes(self.taken(what)?)),
+            Encoding::Binary { .. } => Ok(f64::from_le_bytes(self.taken(what)?)),
         }
     }
 }

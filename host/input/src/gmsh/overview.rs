@@ -2,8 +2,8 @@
 
 use super::assemble::{Assembled, assemble};
 use super::contents::Contents;
-use super::words::{counted, list};
-use super::{Counts, Wanted, counts, unreadable};
+use super::words::{counted, of_two_kinds};
+use super::{Counts, Wanted, counts};
 use crate::Error;
 use mechanics::mesh::Mesh;
 use mechanics::problem::Analysis;
@@ -34,15 +34,15 @@ pub struct Overview {
 /// # Errors
 /// [`text::Error::Unreadable`], with the place in the file.
 pub fn overview(path: &Path) -> Result<Overview, Error> {
-    let bytes = file::read_mesh(path).map_err(|why| unreadable(path, why))?;
+    let bytes = file::read_mesh(path).map_err(|why| text::Error::unreadable(path, why))?;
     of_bytes(&bytes).map_err(|fault| {
         let why = io::Error::new(io::ErrorKind::InvalidData, fault);
-        unreadable(path, why).into()
+        text::Error::unreadable(path, why).into()
     })
 }
 
 fn of_bytes(bytes: &[u8]) -> Result<Overview, String> {
-    let contents = Contents::read(bytes)?;
+    let contents = Contents::read(bytes, false)?;
     let [points, curves, surfaces] = counts(&contents);
     // An element of several surfaces counts for the smallest one.
     let mut by_size: Vec<usize> = (0..surfaces.len()).collect();
@@ -97,13 +97,7 @@ fn off_the_sides(mesh: &Mesh, curves: &Counts) -> Vec<String> {
 /// Names of both curves and points.
 fn two_kinds(curves: &Counts, points: &Counts) -> Option<String> {
     let both = curves.keys().filter(|name| points.contains_key(*name));
-    let both: Vec<String> = both.map(|name| format!("`{name}`")).collect();
-    (!both.is_empty()).then(|| {
-        format!(
-            "physical curves whose names are also those of points: the curves are taken: {}",
-            list(both.into_iter())
-        )
-    })
+    of_two_kinds(both)
 }
 
 /// Nodes of the file, the first ones of the mesh, that have no place in an axisymmetric case.

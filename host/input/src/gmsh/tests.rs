@@ -120,7 +120,7 @@ fn wanting(groups: &[&'static str], lines: &[&'static str]) -> Wanted<'static> {
 }
 
 fn read(bytes: &[u8], wanted: &Wanted<'_>) -> Result<(Mesh, Vec<String>), String> {
-    let assembled = assemble::assemble(&Contents::read(bytes)?, wanted)?;
+    let assembled = assemble::assemble(&Contents::read(bytes, false)?, wanted)?;
     Ok((assembled.mesh, assembled.notes))
 }
 

@@ -24,6 +24,17 @@ pub(super) fn list(names: impl ExactSizeIterator<Item = String>) -> String {
     }
 }
 
+/// What is said of names that curves and points have.
+pub(super) fn of_two_kinds<'n>(both: impl Iterator<Item = &'n String>) -> Option<String> {
+    let both: Vec<String> = both.map(|name| format!("`{name}`")).collect();
+    (!both.is_empty()).then(|| {
+        format!(
+            "physical curves whose names are also those of points: the curves are taken: {}",
+            list(both.into_iter())
+        )
+    })
+}
+
 /// Faults of a file. Several are reported together.
 #[derive(Default)]
 pub(super) struct Faults(Vec<Fault>);

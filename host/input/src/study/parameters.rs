@@ -4,8 +4,8 @@ use super::{COLUMNS, Keys, MOST_RUNS, Method, Parameter, ParameterInput, Spread,
 use crate::Error;
 use crate::spanned::Given;
 use std::ops::Range;
-use text::Source;
-use toml::{Spanned, Value};
+use text::{Source, Spanned};
+use toml::Value;
 
 /// Whether two values are one: 1 and 1.0 are.
 fn is_equal(a: &Value, b: &Value) -> bool {

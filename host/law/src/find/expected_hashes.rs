@@ -3,8 +3,7 @@
 use crate::Error;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
-use text::Source;
-use toml::Spanned;
+use text::{Source, Spanned};
 
 /// Digits of a SHA-256.
 const DIGITS: usize = 64;

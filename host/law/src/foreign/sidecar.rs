@@ -11,8 +11,7 @@ use abi::Hypothesis;
 use serde::Deserialize;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
-use text::Source;
-use toml::Spanned;
+use text::{Source, Spanned};
 
 /// Most components of an internal variable; a slip of the pen beyond.
 const MOST_COMPONENTS: usize = 1000;

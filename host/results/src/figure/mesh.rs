@@ -4,6 +4,7 @@ use super::{
     Area, BELOW, BESIDE, COLOURS, Chart, Drawn, Labels, MARGIN, MARGIN_RIGHT, SIZE, axes, entry,
     name_beside,
 };
+use crate::ends;
 use crate::mesh_table::MeshTable;
 use mechanics::mesh::Solid;
 use mechanics::problem::Axis;
@@ -39,9 +40,8 @@ impl MeshTable {
 
     fn svg(&self, text: &mut String) -> Drawn<()> {
         let extent = [0, 1].map(|c| {
-            let at = self.mesh.nodes.iter().map(|node| node[c]);
-            let low = at.clone().fold(f64::INFINITY, f64::min);
-            low..at.fold(f64::NEG_INFINITY, f64::max)
+            let [low, high] = ends(self.mesh.nodes.iter().map(|node| node[c]));
+            low..high
         });
         let width = SIZE.0 - BESIDE - MARGIN - MARGIN_RIGHT;
         let ([x, y], height) = one_scale(&extent, f64::from(width));

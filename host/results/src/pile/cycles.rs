@@ -71,9 +71,7 @@ pub(crate) fn write(folder: &Path, curve: &Curve) -> Result<(), Error> {
         let stiffness = stiffness.map(number).unwrap_or_default();
         place.chain(values).chain([stiffness]).collect()
     };
-    let header: Vec<String> = COLUMNS.map(str::to_owned).to_vec();
-    let rows: Vec<Vec<String>> = cycles.iter().enumerate().map(row).collect();
-    let text = comma_separated(std::iter::once(header).chain(rows))?;
+    let text = comma_separated(COLUMNS, cycles.iter().enumerate().map(row))?;
     replace(&folder.join(FILE_NAME), text)
 }
 

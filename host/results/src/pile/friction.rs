@@ -10,6 +10,7 @@ use super::geometry::{Facet, Geometry};
 use super::rows::Span;
 use super::split::{Pressed, Split};
 use super::{beside, pressure_beside};
+use crate::ends;
 use mechanics::simulation::Snapshot;
 
 /// Friction (kPa, positive where it holds the pile up), effective normal stress (kPa, compression positive) and slip
@@ -232,11 +233,7 @@ fn is_mean(three: [[f64; 2]; 3], point: [f64; 2]) -> bool {
     let size = three.iter().flatten().fold(0.0, |m: f64, v| m.max(v.abs()));
     let slack = 1e-9 * size;
     let is_between = |c: usize| {
-        let [low, high] = three
-            .iter()
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], at| {
-                [l.min(at[c]), h.max(at[c])]
-            });
+        let [low, high] = ends(three.iter().map(|at| at[c]));
         low - slack <= point[c] && point[c] <= high + slack
     };
     let is_inside = |k: usize| {

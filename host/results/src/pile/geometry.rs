@@ -2,6 +2,7 @@
 
 use super::Parts;
 use super::rows::{Row, Span, rows};
+use crate::ends;
 use mechanics::Simulation;
 use mechanics::group::Group;
 use mechanics::mesh::{Line, Mesh};
@@ -201,10 +202,7 @@ impl Geometry {
 
 impl Body {
     fn new(outline: Vec<[f64; 2]>, analysis: Analysis) -> Self {
-        let z = outline.iter().map(|at| at[1]);
-        let z = z.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], z| {
-            [a.min(z), b.max(z)]
-        });
+        let z = ends(outline.iter().map(|at| at[1]));
         let volume = volume(&outline, analysis);
         Self { outline, z, volume }
     }
@@ -361,10 +359,7 @@ fn shaft(
 
 /// Smallest and largest coordinate of nodes, m.
 fn extent(mesh: &Mesh, nodes: &[usize], c: usize) -> [f64; 2] {
-    let at = nodes.iter().map(|&node| mesh.nodes[node][c]);
-    at.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| {
-        [a.min(v), b.max(v)]
-    })
+    ends(nodes.iter().map(|&node| mesh.nodes[node][c]))
 }
 
 /// Place of a node from the middle of an element's nodes.

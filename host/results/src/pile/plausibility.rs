@@ -3,6 +3,7 @@
 use super::compliance::is_transfer;
 use super::geometry::{SAME, sides};
 use super::{Base, Pile};
+use crate::ends;
 use mechanics::group::Group;
 use mechanics::problem::{Analysis, Axis, Formulation, Phase};
 use mechanics::{Problem, Simulation};
@@ -403,10 +404,4 @@ impl Pile {
 fn rounded(value: f64) -> String {
     let unit = 10_f64.powf(value.log10().floor());
     format!("{:.0e}", (value / unit).round() * unit)
-}
-
-fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {
-    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
-        [low.min(value), high.max(value)]
-    })
 }

@@ -2,6 +2,7 @@
 
 use super::Pile;
 use super::geometry::sides;
+use crate::ends;
 use crate::summary::{Layer, Section};
 use mechanics::Simulation;
 use mechanics::ground::Loading;
@@ -49,9 +50,7 @@ impl Pile {
                         let is_crossed = (a[0] <= x) != (b[0] <= x);
                         is_crossed.then(|| a[1] + (x - a[0]) / (b[0] - a[0]) * (b[1] - a[1]))
                     });
-                let [low, high] = crossed.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], z| {
-                    [l.min(z), h.max(z)]
-                });
+                let [low, high] = ends(crossed);
                 if high > low {
                     pieces.push([high, low]);
                 }

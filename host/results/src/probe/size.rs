@@ -2,6 +2,7 @@
 //! round-off is held against.
 
 use super::{PointQuantity, Probe, Probes};
+use crate::ends;
 use crate::output_request::Reduce;
 use mechanics::group::Group;
 use mechanics::problem::Formulation;
@@ -30,11 +31,7 @@ impl Sizes {
         let n_dofs = snapshot.displacement.len();
         let nodes = &snapshot.mesh.nodes;
         let extent = [0, 1].map(|c| {
-            let (low, high) = nodes
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), node| {
-                    (low.min(node[c]), high.max(node[c]))
-                });
+            let [low, high] = ends(nodes.iter().map(|node| node[c]));
             high - low
         });
         let mut sizes = Self {

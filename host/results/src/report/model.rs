@@ -1,10 +1,11 @@
 //! A model before its first phase, for the report of a dry run: lines, supports, what every phase changes,
 //! and which groups are there when.
 
+use crate::ends;
 use crate::summary::About;
 use mechanics::Simulation;
 use mechanics::ground::Loading;
-use mechanics::problem::{Analysis, Axis, Drainage, Formulation, Phase, Problem, Profile};
+use mechanics::problem::{Analysis, Axis, Drainage, Formulation, Phase, Problem};
 use serde::Serialize;
 
 /// What the page draws over the mesh, and shows in tables.
@@ -131,16 +132,12 @@ fn line(problem: &Problem, name: &str) -> NamedLine {
 fn water(problem: &Problem, now: &Loading) -> Stage {
     let (mut water, mut water_text) = (Vec::new(), "none".to_owned());
     if let Some(level) = &now.water_level {
-        let xs = problem.mesh.nodes.iter().map(|node| node[0]);
-        let (left, right) = (
-            xs.clone().fold(f64::INFINITY, f64::min),
-            xs.fold(f64::NEG_INFINITY, f64::max),
-        );
+        let [left, right] = ends(problem.mesh.nodes.iter().map(|node| node[0]));
         let inner = level.points().iter().map(|point| point[0]);
         let inner = inner.filter(|x| *x > left && *x < right);
         let all = [left].into_iter().chain(inner).chain([right]);
         water = all.map(|x| [x, level.at(x)]).collect();
-        let (low, high) = ends(level);
+        let [low, high] = ends(level.values());
         water_text = if level.is_constant() {
             format!("{low} m")
         } else {
@@ -155,13 +152,6 @@ fn water(problem: &Problem, now: &Loading) -> Stage {
         water_text,
         groups: Vec::new(),
     }
-}
-
-/// Smallest and largest value.
-fn ends(profile: &Profile) -> (f64, f64) {
-    let low = profile.values().fold(f64::INFINITY, f64::min);
-    let high = profile.values().fold(f64::NEG_INFINITY, f64::max);
-    (low, high)
 }
 
 /// State of every group from a stage on.
@@ -221,7 +211,7 @@ fn loads(analysis: Analysis, phase: &Phase) -> Vec<Load> {
     };
     let mut loads = Vec::new();
     for pressure in &phase.pressure {
-        let (low, high) = ends(&pressure.value);
+        let [low, high] = ends(pressure.value.values());
         let text = if pressure.value.is_constant() {
             format!("{low} kPa")
         } else {

@@ -11,7 +11,7 @@ use super::profile::Profile;
 use super::results::{Ending, History, Run};
 use super::{filled, internal};
 use crate::mesh_error::OfPhase;
-use crate::summary::{Figure, Group, Head, Law, Phase, Resistances, Section, Summary};
+use crate::summary::{Figure, Head, Law, Resistances, Section, Summary};
 use minijinja::value::Serde;
 use minijinja::{Value as Template, context};
 use serde::{Deserialize, Serialize};
@@ -250,7 +250,6 @@ fn run_context(run: &Run, folder: &Path, is_running: bool) -> Template {
         .filter(|(file, _)| run.folder.join(file).is_file())
         .filter_map(|(file, what)| Some((*file, *what, link(folder, &run.folder.join(file))?)))
         .collect();
-    let calls = run.summary.law_calls_by_group.iter();
     context! {
         name => run.name.as_str(),
         title => run.title(),
@@ -267,18 +266,16 @@ fn run_context(run: &Run, folder: &Path, is_running: bool) -> Template {
         mesh_error => run.summary.mesh_error.iter().flatten().map(OfPhase::words).collect::<Vec<_>>(),
         pictures => pictures(run),
         resistances => resistances(&run.summary),
-        groups => head.groups.iter().map(group).collect::<Vec<_>>(),
+        groups => Template::from(Serde(&head.groups)),
         laws => head.laws.iter().map(law).collect::<Vec<_>>(),
         solver => named_values(&head.solver),
-        phases => phases.iter().map(phase).collect::<Vec<_>>(),
+        phases => Template::from(Serde(phases)),
         seconds => seconds(took.total),
         seconds_output => seconds(took.output),
-        law_calls => calls.map(|(group, n)| (words(group), display(*n as f64))).collect::<Vec<_>>(),
+        law_calls => Template::from(Serde(&run.summary.law_calls_by_group)),
         cut_backs => cut_backs(&run.log),
         n_cut_backs => run.log.n_cut_backs,
-        case_files => head.case_files.iter()
-            .map(|file| (file.path.clone(), file.text.clone()))
-            .collect::<Vec<_>>(),
+        case_files => Template::from(Serde(&head.case_files)),
     }
 }
 
@@ -462,24 +459,6 @@ fn resistances(summary: &Summary) -> Vec<(String, String)> {
     criteria.into_iter().filter_map(said).chain(left).collect()
 }
 
-fn group(group: &Group) -> Template {
-    let swaps = group.laws_from_phase.iter();
-    let swaps: Vec<String> = swaps
-        .map(|(phase, law)| format!("{law} from phase {phase}"))
-        .collect();
-    context! {
-        name => group.name.as_str(),
-        formulation => group.formulation.replace('_', " "),
-        elements => group.elements,
-        points => match &group.points_per_element {
-            Value::String(several) => several.clone(),
-            one => one.to_string(),
-        },
-        law => group.law.as_str(),
-        swaps => swaps.join(", "),
-    }
-}
-
 fn law((name, law): (&String, &Law)) -> Template {
     let number = |value: Option<f64>| value.map(display).unwrap_or_default();
     let described = law.described_parameters.iter().map(|p| {
@@ -507,7 +486,7 @@ fn law((name, law): (&String, &Law)) -> Template {
 }
 
 /// A name in words.
-fn words(name: &str) -> String {
+pub(super) fn words(name: &str) -> String {
     name.replace('_', " ")
 }
 
@@ -523,22 +502,7 @@ fn named_values(object: &Map<String, Value>) -> Vec<(String, String)> {
     entries.map(|(name, v)| (words(name), value(v))).collect()
 }
 
-fn phase(phase: &Phase) -> Template {
-    context! {
-        name => phase.name.as_str(),
-        equations => phase.equations,
-        increments => phase.increments,
-        iterations => phase.iterations,
-        cut_backs => phase.cut_backs,
-        unreliable => phase.unreliable_steps,
-        factorisations => phase.factorisations,
-        laws => seconds(phase.seconds.laws_and_forces),
-        assembly => seconds(phase.seconds.assembly),
-        solution => seconds(phase.seconds.equations),
-    }
-}
-
-fn seconds(seconds: Option<f64>) -> Option<String> {
+pub(super) fn seconds(seconds: Option<f64>) -> Option<String> {
     seconds.map(|seconds| format!("{seconds:.3}"))
 }
 

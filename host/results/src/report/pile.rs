@@ -5,23 +5,13 @@ use super::number_format::{Short, thinned};
 use super::profile::{AHEAD, Block, Blocks, Place};
 use super::results::Times;
 use super::table::Table;
+use crate::pile::OF_STATION;
 use serde::Serialize;
 use std::path::Path;
 use text::Error;
 
-/// Columns that the table has to have: place, station, quantities.
-const COLUMNS: [&str; 10] = [
-    "phase",
-    "increment",
-    "z",
-    "axial_force",
-    "shaft_friction",
-    "normal_stress",
-    "slip",
-    "settlement",
-    "axial_force_net",
-    "shaft_friction_net",
-];
+/// Columns of the place of a row.
+const PLACE: [&str; 2] = ["phase", "increment"];
 
 /// The pile of a run.
 #[derive(Debug, Serialize)]
@@ -49,10 +39,10 @@ struct Rows {
 
 impl Rows {
     fn read(path: &Path, budget: &Budget, notes: &mut Vec<String>) -> Result<Self, Error> {
-        let table = Table::open(path, &COLUMNS)?;
-        let at = COLUMNS.map(|name| table.position(name).unwrap_or_default());
-        let [phase_at, increment_at, z_at, ..] = at;
-        let quantities = &at[3..];
+        let table = Table::open(path, &[&PLACE[..], &OF_STATION].concat())?;
+        let position = |name| table.position(name).unwrap_or_default();
+        let [phase_at, increment_at] = PLACE.map(position);
+        let [z_at, quantities @ ..] = OF_STATION.map(position);
         let mut rows = Self {
             phases: Vec::new(),
             z: Vec::new(),
@@ -149,7 +139,7 @@ impl Pile {
         let by_quantity =
             (0..width).map(|column| shown.iter().map(|block| of(column, block)).collect());
         Ok(Some(Self {
-            columns: COLUMNS[3..].to_vec(),
+            columns: OF_STATION[1..].to_vec(),
             increments: shown.iter().map(place).collect(),
             values: by_quantity.collect(),
             z: z.into_iter().map(short).collect(),

@@ -8,6 +8,7 @@ use super::budget::Budget;
 use super::number_format::{Short, thinned};
 use super::results::Times;
 use super::table::{Row, Table};
+use crate::ends;
 use serde::Serialize;
 use std::path::Path;
 use text::Error;
@@ -461,9 +462,7 @@ fn stations(points: &[Point], members: &[usize], across: usize, length: f64) -> 
 }
 
 fn extent(values: impl Iterator<Item = f64>) -> f64 {
-    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-        (low.min(value), high.max(value))
-    });
+    let [low, high] = ends(values);
     high - low
 }
 

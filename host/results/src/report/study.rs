@@ -12,9 +12,9 @@ use crate::study::{
 };
 use crate::table::comma_separated;
 use indexmap::{IndexMap, IndexSet};
+use minijinja::value::Serde;
 use minijinja::{Value as Template, context};
 use serde::Serialize;
-use std::iter;
 use std::path::Path;
 use text::Error;
 use text::write::replace_whole;
@@ -195,7 +195,7 @@ fn effects_table(record: &Record, found: &IndexMap<String, Vec<Effect>>) -> Resu
     };
     let rows = found.iter();
     let rows = rows.flat_map(|(output, effects)| effects.iter().map(move |e| row(output, e)));
-    comma_separated(iter::once(header.map(str::to_owned).to_vec()).chain(rows))
+    comma_separated(header, rows)
 }
 
 fn varied(number: usize, parameter: &ParameterRecord, rows: &[Row]) -> Varied {
@@ -295,10 +295,6 @@ fn page(
         let of_run: Vec<String> = of_run.collect();
         context! { numbers => of_run, ..run_context(row) }
     };
-    let parameters = record.parameters.iter();
-    let parameters = parameters
-        .map(|p| context! { name => p.name.clone(), keys => p.keys.clone(), spread => p.spread.clone() })
-        .collect::<Vec<Template>>();
     context! {
         version => env!("CARGO_PKG_VERSION"),
         style => STYLE,
@@ -316,7 +312,7 @@ fn page(
         n_failed => failed().count(),
         failed => failed().take(MOST_FAILED).map(run_context).collect::<Vec<_>>(),
         unfinished => unfinished(rows),
-        parameters,
+        parameters => Template::from(Serde(&record.parameters)),
         outputs,
         thinned => left_out.map(|most| format!(
             "About {most} rows of each history are shown, evenly spaced, with the last of each phase; history.csv has all."

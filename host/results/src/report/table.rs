@@ -27,10 +27,7 @@ impl Table {
     /// # Errors
     /// [`Error::Unreadable`]; [`Error::Input`] if a column is missing.
     pub(super) fn open(path: &Path, needed: &[&str]) -> Result<Self, Error> {
-        let unreadable = |source| Error::Unreadable {
-            path: path.to_owned(),
-            source,
-        };
+        let unreadable = |why| Error::unreadable(path, why);
         let mut file = open_regular(path).map_err(unreadable)?;
         let is_cut = ends_in_a_row(&mut file).map_err(unreadable)?;
         let mut reader = csv::ReaderBuilder::new()
@@ -90,10 +87,7 @@ impl Table {
         let (mut row, mut next) = (Row::default(), Row::default());
         let mut read = |row: &mut Row| {
             let read = self.reader.read_byte_record(&mut row.0);
-            read.map_err(|error| Error::Unreadable {
-                path: self.path.clone(),
-                source: io::Error::other(error.to_string()),
-            })
+            read.map_err(|why| Error::unreadable(&self.path, io::Error::other(why.to_string())))
         };
         let mut has_row = read(&mut row)?;
         while has_row {

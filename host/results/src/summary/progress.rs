@@ -1,5 +1,6 @@
 //! The record of a run in progress: what a simulation and its case give to `summary.json`.
 
+use crate::ends;
 use crate::mesh_error::OfPhase;
 use crate::output_request::{self, OutputRequest};
 use crate::summary::{
@@ -426,9 +427,7 @@ fn expressions(
             Variation::Elements(values) => values.as_slice(),
             Variation::Height(_) => &[],
         });
-        let ends = [f64::INFINITY, f64::NEG_INFINITY];
-        used.chain(elements.copied())
-            .fold(ends, |[low, high], value| [low.min(value), high.max(value)])
+        ends(used.chain(elements.copied()))
     };
     own.map(|[_, id, expression]| {
         let [smallest, largest] = range(id);

@@ -104,10 +104,7 @@ impl Model {
             for derivative in &mut column {
                 *derivative *= slope;
             }
-            let of_curves = of_test.of_curves(&column);
-            of_curves
-                .flat_map(|(curve, own)| curve.weighed(own))
-                .collect()
+            of_test.weighed(&column)
         };
         let weighed = columns
             .ok()

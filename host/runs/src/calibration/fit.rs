@@ -58,14 +58,7 @@ impl Search<'_> {
         let derivative = self
             .model
             .difference(test, parameter, (&self.all, &here), sides)?;
-        let of_test = &self.model.tests[test];
-        let weighed = |derivative: Vec<f64>| {
-            let of_curves = of_test.of_curves(&derivative);
-            of_curves
-                .flat_map(|(curve, own)| curve.weighed(own))
-                .collect()
-        };
-        Ok(derivative.map(weighed))
+        Ok(derivative.map(|derivative| self.model.tests[test].weighed(&derivative)))
     }
 }
 

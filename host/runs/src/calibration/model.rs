@@ -368,6 +368,14 @@ impl Test {
             .collect()
     }
 
+    /// Differences at all measured points, each as its curve weighs it.
+    pub(super) fn weighed(&self, differences: &[f64]) -> Vec<f64> {
+        let of_curves = self.of_curves(differences);
+        of_curves
+            .flat_map(|(curve, own)| curve.weighed(own))
+            .collect()
+    }
+
     /// The curves, each with its own of values at all measured points.
     pub(super) fn of_curves<'a, T>(
         &'a self,

@@ -52,7 +52,7 @@ fn report(outcome: &Outcome, all: &Value, drawn: &Drawn, folder: &Path) -> Resul
     let picture = |(name, heading): &(String, String)| {
         let path = folder.join(format!("{name}.svg"));
         let svg = std::fs::read_to_string(&path);
-        let svg = svg.map_err(|source| text::Error::Unreadable { path, source })?;
+        let svg = svg.map_err(|why| text::Error::unreadable(&path, why))?;
         Ok(context! { heading, svg })
     };
     let pictures =

@@ -134,13 +134,9 @@ impl Errors {
                 let Some(gradient) = gradient else {
                     return Ok(None);
                 };
-                let weighed = of_test.of_curves(&gradient);
-                let weighed: Vec<f64> = weighed
-                    .flat_map(|(curve, own)| curve.weighed(own))
-                    .collect();
                 matrix
-                    .view_mut((first, column), (weighed.len(), 1))
-                    .copy_from_slice(&weighed);
+                    .view_mut((first, column), (gradient.len(), 1))
+                    .copy_from_slice(&of_test.weighed(&gradient));
             }
             first += of_test.n_points();
         }

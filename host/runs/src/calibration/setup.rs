@@ -16,7 +16,7 @@ use names::{Claim, Given, Known, claims, names};
 use results::output_request::Output;
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
-use toml::Spanned;
+use text::Spanned;
 
 /// Step of differences of drivers, whose results are known to many digits.
 const STEP_OF_DRIVERS: f64 = 1e-4;
@@ -145,7 +145,7 @@ impl Model {
                     format!(", curve {}", curve + 1)
                 };
                 for (place, (key, none, reading)) in written.readings().into_iter().enumerate() {
-                    let Some(reading) = reading.map(toml::Spanned::get_ref) else {
+                    let Some(reading) = reading.map(text::Spanned::get_ref) else {
                         continue;
                     };
                     let bounds = [reading.min, reading.max];

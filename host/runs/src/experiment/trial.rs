@@ -8,8 +8,9 @@ use crate::Error;
 use crate::run::{Observer, run};
 use input::Case;
 use law::Stop;
+use results::study::History;
+use results::{Phase, Summary};
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -164,18 +165,25 @@ pub(crate) fn measure(mut case: Case, scratch: &Scratch, timing: Timing) -> Resu
     let summary = Summary::read(&scratch.folder)?;
     let phases = case.file.phases.iter().map(|phase| phase.name.get_ref());
     let phases: Vec<&str> = phases.map(String::as_str).collect();
-    let mut rows = history(&scratch.folder.join("history.csv"), &phases)?;
+    let mut rows = rows_of(&History::read(&scratch.folder), &phases);
     let share = (TOLERATED * case.file.solver.get_ref().force_tolerance).clamp(ZERO[0], ZERO[1]);
     let magnitude = |name: &String| summary.probe_magnitudes.get(name).copied().flatten();
     let zeros = rows.names.iter();
     rows.zeros = zeros
         .map(|name| share * magnitude(name).unwrap_or_default())
         .collect();
+    let sum = |of: fn(&Phase) -> Option<u64>| summary.phases.iter().filter_map(of).sum();
+    let is_linear = |phase: &Phase| phase.iterations <= phase.increments;
     Ok(Trial {
         rows,
         seconds,
-        counts: summary.counts(),
-        linear: summary.linear(),
+        counts: Counts {
+            iterations: sum(|phase| phase.iterations),
+            factorisations: sum(|phase| phase.factorisations),
+            law_calls: summary.law_calls_by_group.values().sum(),
+            cut_backs: sum(|phase| phase.cut_backs),
+        },
+        linear: summary.phases.iter().map(is_linear).collect(),
     })
 }
 
@@ -197,65 +205,21 @@ impl Observer for Meter {
 }
 
 /// Probes of a history by phase and increment.
-fn history(path: &Path, phases: &[&str]) -> Result<Rows, Error> {
-    let broken = |error: csv::Error| Error::internal(format!("{}: {error}", path.display()));
-    let mut reader = csv::Reader::from_path(path).map_err(broken)?;
-    let headers = reader.headers().map_err(broken)?.clone();
-    let probes: Vec<usize> = (0..headers.len())
-        .filter(|&i| !["phase", "increment", "time", "iterations"].contains(&&headers[i]))
-        .collect();
-    let mut rows = Rows {
-        names: probes.iter().map(|&i| headers[i].to_owned()).collect(),
-        stretches: vec![Vec::new(); phases.len()],
+fn rows_of(history: &History, phases: &[&str]) -> Rows {
+    let is_probe = |name: &&String| !["increment", "time", "iterations"].contains(&name.as_str());
+    let names: Vec<String> = history.names.iter().filter(is_probe).cloned().collect();
+    let columns = names.iter().filter_map(|name| history.column(name));
+    let columns: Vec<&[Option<f64>]> = columns.collect();
+    let mut stretches = vec![Vec::new(); phases.len()];
+    for (row, phase) in history.phases.iter().enumerate() {
+        if let Some(number) = phases.iter().position(|name| name == phase) {
+            let values = columns.iter().map(|column| column[row].unwrap_or(f64::NAN));
+            stretches[number].push(values.collect());
+        }
+    }
+    Rows {
+        names,
+        stretches,
         zeros: Vec::new(),
-    };
-    for row in reader.records() {
-        let row = row.map_err(broken)?;
-        if let Some(number) = phases.iter().position(|name| *name == &row[0]) {
-            let value = |&i: &usize| row[i].parse().unwrap_or(f64::NAN);
-            rows.stretches[number].push(probes.iter().map(value).collect());
-        }
-    }
-    Ok(rows)
-}
-
-/// What counts of `summary.json`.
-#[derive(Deserialize)]
-struct Summary {
-    phases: Vec<Phase>,
-    law_calls_by_group: BTreeMap<String, u64>,
-    probe_magnitudes: BTreeMap<String, Option<f64>>,
-}
-
-#[derive(Deserialize)]
-struct Phase {
-    increments: u64,
-    iterations: u64,
-    factorisations: u64,
-    cut_backs: u64,
-}
-
-impl Summary {
-    fn read(folder: &Path) -> Result<Self, Error> {
-        let path = folder.join("summary.json");
-        let text = std::fs::read_to_string(&path);
-        let text = text.map_err(|source| text::Error::Unreadable { path, source })?;
-        serde_json::from_str(&text).map_err(|error| Error::internal(error.to_string()))
-    }
-
-    fn counts(&self) -> Counts {
-        let sum = |of: fn(&Phase) -> u64| self.phases.iter().map(of).sum();
-        Counts {
-            iterations: sum(|phase| phase.iterations),
-            factorisations: sum(|phase| phase.factorisations),
-            law_calls: self.law_calls_by_group.values().sum(),
-            cut_backs: sum(|phase| phase.cut_backs),
-        }
-    }
-
-    /// For every phase that ended, whether each of its increments took one iteration.
-    fn linear(&self) -> Vec<bool> {
-        let phases = self.phases.iter();
-        phases.map(|p| p.iterations <= p.increments).collect()
     }
 }

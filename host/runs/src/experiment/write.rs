@@ -22,15 +22,7 @@ pub(crate) fn csv(
     columns: impl IntoIterator<Item: AsRef<[u8]>>,
     rows: impl IntoIterator<Item = Vec<String>>,
 ) -> Result<String, Error> {
-    let broken = |error: csv::Error| Error::internal(format!("table: {error}"));
-    let mut table = csv::Writer::from_writer(Vec::new());
-    table.write_record(columns).map_err(broken)?;
-    for row in rows {
-        table.write_record(row).map_err(broken)?;
-    }
-    let text = table.into_inner().map_err(|error| error.to_string());
-    let text = text.and_then(|text| String::from_utf8(text).map_err(|error| error.to_string()));
-    text.map_err(|error| Error::internal(format!("table: {error}")))
+    Ok(results::comma_separated(columns, rows)?)
 }
 
 /// A page in the style of the reports. Numbers of its contents are brought into digits by the template.

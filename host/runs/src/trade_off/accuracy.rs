@@ -24,7 +24,7 @@ use mechanics::equilibrium::Reuse;
 use results::Figures;
 use search::Search;
 use std::path::Path;
-use toml::Spanned;
+use text::Spanned;
 
 /// Share of the target for increments and tolerance where the mesh has the rest.
 const WITHOUT_MESH: f64 = 0.5;

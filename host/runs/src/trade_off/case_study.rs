@@ -518,7 +518,7 @@ impl<'a> Cases<'a> {
     /// Integrations of thin layers that no layer has in the file.
     fn other_integrations(&self) -> Vec<Settings> {
         let groups = self.trials.case.file.groups.values();
-        let groups = groups.map(toml::Spanned::get_ref);
+        let groups = groups.map(text::Spanned::get_ref);
         let layers = groups.filter(|group| group.formulation == Formulation::ThinLayer);
         let layers: Vec<Integration> = layers
             .map(|group| group.integration.as_ref().map(|i| *i.get_ref()))

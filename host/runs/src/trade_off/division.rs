@@ -5,7 +5,7 @@ use input::case::{Axis, PartInput};
 use input::{Case, mesh};
 use mechanics::mesh::{Mesh, Solid};
 use mechanics::problem::Formulation;
-use toml::Spanned;
+use text::Spanned;
 
 /// Divides sides of elements by a whole number. In a grid columns and rows are divided, so that the
 /// lines of the given mesh stay. Elements of a file have their sides halved until there are that

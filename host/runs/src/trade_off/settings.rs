@@ -163,9 +163,9 @@ impl Settings {
             solver.displacement_tolerance = (ratio * tolerance).clamp(1e-14, 1.0);
         }
         if let Some(integration) = self.integration {
-            let layers = file.groups.values_mut().map(toml::Spanned::get_mut);
+            let layers = file.groups.values_mut().map(text::Spanned::get_mut);
             for group in layers.filter(|g| g.formulation == Formulation::ThinLayer) {
-                group.integration = Some(toml::Spanned::new(0..0, integration));
+                group.integration = Some(text::Spanned::new(0..0, integration));
             }
         }
         if let Some((name, values, _)) = &self.law {

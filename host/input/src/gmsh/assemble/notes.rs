@@ -1,7 +1,7 @@
 //! What a user should know of a mesh that can be computed.
 
 use super::super::twins::twins;
-use super::super::words::{counted, list};
+use super::super::words::{counted, list, of_two_kinds};
 use super::{Assembly, JOIN, ends_of};
 use mechanics::mesh::Mesh;
 
@@ -24,13 +24,7 @@ impl Assembly<'_> {
         let both = curves.iter().filter(|(name, n)| {
             **n > 0 && points.contains_key(*name) && self.wanted.lines.contains(name.as_str())
         });
-        let both: Vec<String> = both.map(|(name, _)| format!("`{name}`")).collect();
-        if !both.is_empty() {
-            self.notes.push(format!(
-                "physical curves whose names are also those of points: the curves are taken: {}",
-                list(both.into_iter())
-            ));
-        }
+        self.notes.extend(of_two_kinds(both.map(|(name, _)| name)));
         let unused = |name: &&String| !self.wanted.lines.contains(name.as_str());
         let unused: Vec<&String> = curves.keys().chain(points.keys()).filter(unused).collect();
         if !unused.is_empty() {

@@ -5,8 +5,7 @@ use crate::calibration::curve::{Curve, Gap, extent};
 use crate::calibration::model::Subject;
 use crate::experiment::Rows;
 use input::calibration::{Calibration, CurveInput, TestInput};
-use text::suggestion;
-use toml::Spanned;
+use text::{Spanned, suggestion};
 
 /// The curves of a test.
 pub(super) fn curves(

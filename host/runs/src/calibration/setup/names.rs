@@ -5,8 +5,7 @@ use crate::calibration::model::Subject;
 use input::calibration::{Calibration, FreeInput};
 use input::material::ParameterValue;
 use law::{LawDescription, ParameterDescription};
-use text::suggestion;
-use toml::Spanned;
+use text::{Spanned, suggestion};
 
 /// A law that a test calls.
 #[derive(Clone, Debug)]
