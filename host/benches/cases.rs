@@ -190,8 +190,8 @@ impl Chamber {
             force_end: forces,
             prescribed: held.map(|dof| (dof, 0.0, push(dof))).collect(),
             out_of_balance: vec![0.0; n_dofs],
-            scale: 0.0,
             largest: vec![0.0; n_dofs],
+            ..Loads::default()
         };
         Self {
             mesh,

@@ -230,7 +230,7 @@ fn assert_resistances(place: &Place, stdout: &str, history: &[Row], area: f64) {
     let expected = a[1] + (0.08 - a[0]) / (b[0] - a[0]) * (b[1] - a[1]);
     let found = pile["resistance_10_percent_diameter"].as_f64().unwrap();
     near(found, expected, 1e-9 * expected);
-    has(&stdout, format!("{found:.1} kN, of it shaft"));
+    has(stdout, format!("{found:.1} kN, of it shaft"));
     // Davisson: s = Q L/(E A) + 3.8 mm + D/120, on the straight piece of the curve that it crosses.
     let davisson = pile["resistance_davisson"].as_f64().unwrap();
     let s = (davisson - value(&history[3], "pile_head_load")) * 5.0 / (3e7 * area)

@@ -207,7 +207,7 @@ fn a_stopped_study_has_its_rows_and_goes_on() {
     for done in ["as in the file", "the file's mesh", "increments × 0.25"] {
         assert!(settings.contains(&done), "{settings:?}");
     }
-    has(&said(&place), "--resume goes on from there");
+    has(said(&place), "--resume goes on from there");
     for file in ["trade_off.svg", "trade_off.html", "trials.jsonl"] {
         assert!(place.path("out").join(file).is_file(), "{file}");
     }

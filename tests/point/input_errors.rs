@@ -213,10 +213,7 @@ fn internal_variables() {
 #[test]
 fn initial_states_that_the_law_refuses() {
     let mepi = |traction: &str| {
-        format!(
-            "law = 'mepi'\nhypothesis = 'interface_2d'\n{}[initial]\n{traction}\n{SEGMENT}",
-            MEPI
-        )
+        format!("law = 'mepi'\nhypothesis = 'interface_2d'\n{MEPI}[initial]\n{traction}\n{SEGMENT}")
     };
     refuses(
         &mepi("traction = { n = 100 }"),

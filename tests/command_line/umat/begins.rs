@@ -85,6 +85,6 @@ fn the_time_of_a_step_is_asked_for_where_the_time_counts() {
     let (checks, outcome) = checked(&place, "begins", &["--set", "what=2"]);
     let [found, details] = &checks[CHECK];
     assert_eq!(found, "warning", "{details}");
-    has(&details, "with TIME(1) = 0 in place of 1 STRESS [");
+    has(details, "with TIME(1) = 0 in place of 1 STRESS [");
     outcome.ended(DONE);
 }

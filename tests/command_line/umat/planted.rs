@@ -121,7 +121,7 @@ fn paths_that_never_yield_are_told_of() {
     outcome.ended(DONE);
     let [found, details] = &checks["paths-leave-elasticity"];
     assert_eq!(found, "warning", "{details}");
-    has(&details, "none of the increments leaves elasticity");
+    has(details, "none of the increments leaves elasticity");
 }
 
 /// Values that nothing speaks for are named, and are not where they are given.
@@ -136,7 +136,7 @@ fn parameters_without_a_ground_are_named() {
     let (checks, _) = checked(&place, "planted", &["--set", "prop_2=0.3"]);
     let [found, details] = &checks["sidecar-is-read"];
     assert_eq!(found, "warning", "{details}");
-    has(&details, "checked with `prop_1` = 1, `prop_3` = 1");
+    has(details, "checked with `prop_1` = 1, `prop_3` = 1");
     // What the guide leaves out of a sidecar is not asked for.
     let [found, details] = &checks["description-is-complete"];
     assert_eq!(found, "passed", "{details}");
