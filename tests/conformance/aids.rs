@@ -414,7 +414,7 @@ fn a_sidecar_that_cannot_be_read_is_told_with_its_line() {
     let id = "sidecar-is-read";
     let report = check(&library, &["--only", id]);
     let details = report.check(id)["details"].as_str().unwrap();
-    has(&details, format!("law.toml:{line}: unknown key `state`; "));
+    has(details, format!("law.toml:{line}: unknown key `state`; "));
     let silent = format!("{good}\n[[internal]]\nid = \"slip\"\nunit = \"-\"\ndoc = \"\"\n");
     std::fs::write(&sidecar, silent).unwrap();
     let id = "description-is-complete";
@@ -457,7 +457,7 @@ fn a_law_that_gave_up_in_an_earlier_call_fails() {
     let report = check(&library, &["--only", id]);
     assert_eq!(report.with(&["failed"]), [id], "{:#}", report.json);
     let details = report.check(id)["details"].as_str().unwrap();
-    has(&details, "`init_state` gave PILUM_E_INTERNAL");
+    has(details, "`init_state` gave PILUM_E_INTERNAL");
 }
 
 /// The report on a law that panicked has its message at that time, and not only that it is not called again.

@@ -22,7 +22,7 @@ fn fails(report: &Report, library: &Path, id: &str, outcome: &str) {
     let check = report.check(id);
     assert_eq!(check["outcome"], outcome, "{name}: {check:#}");
     let replay = check["replay"].as_str().unwrap();
-    has(&replay, format!("--only {id} --seed 1"));
+    has(replay, format!("--only {id} --seed 1"));
     assert_eq!(report.code, Some(3), "{name}: {}", report.stderr);
     assert!(report.stderr.contains("error: "), "{}", report.stderr);
 }

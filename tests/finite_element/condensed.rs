@@ -33,8 +33,11 @@ fn chamber(case: &str, variants: &str) -> Vec<Case> {
     Case::load(&file).unwrap()
 }
 
+/// Values by column.
+type Row = BTreeMap<String, String>;
+
 /// Rows of the history of a run, and its factorisations by phase.
-fn run(case: &Case, reuse: &mut Reuse) -> (Vec<BTreeMap<String, String>>, Vec<u64>) {
+fn run(case: &Case, reuse: &mut Reuse) -> (Vec<Row>, Vec<u64>) {
     let folder = tempfile::tempdir().unwrap();
     let (observer, options) = (&mut Silent::default(), Options::default());
     run_reusing(case, folder.path(), observer, reuse, options).unwrap();
@@ -47,7 +50,7 @@ fn run(case: &Case, reuse: &mut Reuse) -> (Vec<BTreeMap<String, String>>, Vec<u6
 }
 
 /// Variants of the chamber, each by itself.
-fn runs(case: &str, variants: &str) -> Vec<(Vec<BTreeMap<String, String>>, Vec<u64>)> {
+fn runs(case: &str, variants: &str) -> Vec<(Vec<Row>, Vec<u64>)> {
     let cases = chamber(case, variants);
     let alone = cases.iter().map(|case| run(case, &mut Reuse::default()));
     alone.collect()
@@ -72,13 +75,11 @@ fn condensing_the_ground_changes_no_answer() {
     }
 }
 
-type Rows = [BTreeMap<String, String>];
-
 /// All probes of this many increments are the same but for 1e-9 of their largest value.
-fn agree(case: &str, condensed: &Rows, sparse: &Rows, increments: usize) {
+fn agree(case: &str, condensed: &[Row], sparse: &[Row], increments: usize) {
     let probes = condensed[0].keys();
     for probe in probes.filter(|name| !["phase", "iterations"].contains(&name.as_str())) {
-        let values = |rows: &Rows| -> Vec<f64> {
+        let values = |rows: &[Row]| -> Vec<f64> {
             rows.iter().map(|row| row[probe].parse().unwrap()).collect()
         };
         let (a, b) = (values(condensed), values(sparse));
