@@ -165,7 +165,12 @@ pub(crate) fn measure(mut case: Case, scratch: &Scratch, timing: Timing) -> Resu
     let summary = Summary::read(&scratch.folder)?;
     let phases = case.file.phases.iter().map(|phase| phase.name.get_ref());
     let phases: Vec<&str> = phases.map(String::as_str).collect();
-    let mut rows = rows_of(&History::read(&scratch.folder), &phases);
+    let history = History::read(&scratch.folder);
+    if history.names.is_empty() {
+        let file = scratch.folder.join("history.csv");
+        return Err(Error::usage(format!("cannot read {}", file.display())));
+    }
+    let mut rows = rows_of(&history, &phases);
     let share = (TOLERATED * case.file.solver.get_ref().force_tolerance).clamp(ZERO[0], ZERO[1]);
     let magnitude = |name: &String| summary.probe_magnitudes.get(name).copied().flatten();
     let zeros = rows.names.iter();
