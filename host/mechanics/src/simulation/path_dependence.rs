@@ -204,8 +204,7 @@ impl Neighbour {
                 forces,
                 largest: [displacement, force],
             } => format!(
-                "at most {displacement:.1e} m and {force:.1e} kN at a node; {displacements:.1e} and {forces:.1e} of what the \
-                 step changes"
+                "at most {displacement:.1e} m and {force:.1e} kN at a node ({displacements:.1e} and {forces:.1e} of the step)"
             ),
             Self::None => String::new(),
         }

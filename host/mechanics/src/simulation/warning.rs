@@ -350,7 +350,7 @@ fn out_of_balance(f: &mut fmt::Formatter<'_>, phase: &str, share: f64) -> fmt::R
 fn cut_back(f: &mut fmt::Formatter<'_>, place: &Place, in_halves: Neighbour) -> fmt::Result {
     write!(
         f,
-        "{place}: results depend on the step size: the same step in two halves "
+        "{place}: results depend on the step size. The same step in two halves "
     )?;
     match in_halves {
         Neighbour::Apart { .. } => write!(f, "differs by {}", in_halves.distance())?,
@@ -380,7 +380,7 @@ fn stalled(
         }
         Some(other @ Neighbour::Apart { .. }) => write!(
             f,
-            "{place}: {found} an equilibrium; viscous control finds one that differs by {}",
+            "{place}: {found} an equilibrium; viscous control finds another. They differ by {}",
             other.distance()
         )?,
         Some(Neighbour::None) => write!(
@@ -466,7 +466,8 @@ mod tests {
             forces: 5e-4,
             largest: [1e-6, 0.7],
         });
-        let distance = "by at most 1.0e-6 m and 7.0e-1 kN at a node; 2.0e-3 and 5.0e-4 of what the step changes";
+        let distance =
+            "by at most 1.0e-6 m and 7.0e-1 kN at a node (2.0e-3 and 5.0e-4 of the step)";
         assert!(apart.contains(distance), "{apart}");
         let none = of(Neighbour::None);
         assert!(none.contains("finds no equilibrium"), "{none}");
