@@ -391,6 +391,26 @@ fn warns_of_an_axis_that_is_free() {
 }
 
 #[test]
+fn warns_of_peaks_between_increments() {
+    let course = |n: usize, course: &str| {
+        let to = format!("increments = {n}\ncourse = {course}\n{PUSH}");
+        warnings(&[(
+            "increments = 2\ndisplacement = [{ line = \"top\", x = 1e-5 }]",
+            &*Box::leak(to.into_boxed_str()),
+        )])
+    };
+    let peaks = "[[0, 0], [0.25, 1], [0.5, 0.2], [0.75, 1], [1, 0.2]]";
+    let said = "phase `push`: `course` turns at 0.25, 0.5 and 0.75 of its time, between the ends of its 7 increments: no \
+                row of the results has what is reached there; `increments = 8` meets all";
+    assert_eq!(course(7, peaks), [said]);
+    assert!(course(8, peaks).is_empty());
+    // It stays at its peak until an increment ends; and it does not turn.
+    assert!(course(2, "[[0, 0], [0.3, 1], [0.6, 1], [1, 0]]").is_empty());
+    assert!(course(2, "[[0, 0], [0.3, 0.1], [1, 1]]").is_empty());
+    assert_eq!(course(2, "[[0, 0], [0.3, 1], [0.4, 1], [1, 0]]").len(), 1);
+}
+
+#[test]
 fn tells_drivers_from_cases() {
     let place = Place::new();
     place.write("case.toml", CASE);

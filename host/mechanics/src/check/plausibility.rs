@@ -42,6 +42,7 @@ pub(crate) fn warnings(
     warnings.extend(weights(problem));
     warnings.extend(dry_weights(problem));
     warnings.extend(lost(problem));
+    warnings.extend(super::peaks::warnings(problem));
     warnings.extend(super::uncovered_loads::warnings(problem));
     warnings.extend(beside_undrained(problem));
     warnings.extend(water_inside(problem));
