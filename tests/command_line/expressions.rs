@@ -94,12 +94,34 @@ fn values_over_the_height_count_at_the_element() {
     let range = &summary["laws"]["joint (interface_2d)"]["expressions"]["shear_stiffness"];
     assert_eq!(range["smallest"].as_f64(), Some(3e5));
     assert_eq!(range["largest"].as_f64(), Some(5e5));
-    let given = (
+    let over = (
         "shear_stiffness = 4e5",
         "shear_stiffness = { z = [[0.0, 2e5], [1.0, 6e5]] }",
     );
-    let (_, given) = run(&upright(&[given]), &[]);
+    let follows_in = summary;
+    let (summary, given) = run(&upright(&[over]), &[]);
     assert_eq!(follows, given);
+    // There is no one value.
+    let of = |summary: &Value, id: &str| {
+        let joint = &summary["laws"]["joint (interface_2d)"];
+        let range = &joint["varying"][id];
+        (
+            joint["parameters"][id].as_f64(),
+            [&range["smallest"], &range["largest"]].map(Value::as_f64),
+        )
+    };
+    assert_eq!(
+        of(&follows_in, "shear_stiffness"),
+        (None, [Some(3e5), Some(5e5)])
+    );
+    assert_eq!(
+        of(&summary, "shear_stiffness"),
+        (None, [Some(2e5), Some(6e5)])
+    );
+    assert_eq!(of(&summary, "cohesion"), (Some(10.0), [None; 2]));
+    let place = Place::new();
+    place.done_case(upright(&[over]));
+    assert!(place.read("out/report.html").contains("200000 to 600000"));
 }
 
 /// Of E(z), at the centre of each element of the joint.

@@ -330,6 +330,19 @@ mod tests {
         assert_eq!(shown(&json!([1, 2])), "[1,2]");
     }
 
+    #[test]
+    fn parameters_over_the_height_differ_by_their_ranges() {
+        let with = |smallest: f64| {
+            let c = json!({ "smallest": smallest, "largest": 30.0 });
+            let law = json!({ "law": "l", "parameters": { "c": null }, "varying": { "c": c } });
+            run(json!({ "status": "done", "laws": { "a (interface_2d)": law } }))
+        };
+        let names = ["a", "b"].map(str::to_owned);
+        let table = written(&names, &[with(10.0), with(20.0)]).unwrap();
+        let expected = "run,status,laws.a.parameters.c\na,done,10 to 30\nb,done,20 to 30\n";
+        assert_eq!(table, expected);
+    }
+
     /// A key that only one file gives counts as different; a law that one run lacks is no column.
     #[test]
     fn what_a_law_is_made_and_started_with_differs() {
