@@ -223,6 +223,25 @@ fn ground_that_sinks_drags_a_pile_down_above_its_neutral_plane() {
     }
 }
 
+/// Where the shaft slides, friction has a bend in the element of the neutral plane; the pile has no weight.
+#[test]
+fn load_and_dragload_are_the_largest_force_of_a_shaft_that_slides() {
+    let load = 100.0;
+    let phases = format!(
+        "[[phase]]\nname = \"load\"\nincrements = 1\nforce = [{{ line = \"head\", z = -{load} }}]\n\
+         [[phase]]\nname = \"drag\"\nincrements = 4\ndisplacement = [{{ line = \"top\", z = -0.01 }}]"
+    );
+    let (place, _) = run(&ring(12.0, &phases));
+    let history = rows(&place.path("out/history.csv"));
+    let mut dragged = 0;
+    for row in history.iter().filter(|row| row["pile_neutral_plane"] != "") {
+        let sum = load + value(row, "pile_dragload");
+        close(value(row, "pile_max_axial_force"), sum, 1e-6, "sum");
+        dragged += 1;
+    }
+    assert!(dragged >= 3, "{history:?}");
+}
+
 #[test]
 fn cycles_are_those_by_hand() {
     // The joint slides at 2 mm: at 10 mm the load is r · 2 mm, and 1 mm back half of it.
