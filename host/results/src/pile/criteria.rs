@@ -139,6 +139,11 @@ impl Curve {
         self.phases.iter()
     }
 
+    /// Settlement, and gross loads of head, shaft and base, after the last increment.
+    pub(super) fn last(&self) -> Option<[f64; 4]> {
+        self.last
+    }
+
     pub(crate) fn phase(
         &mut self,
         phase: &str,
