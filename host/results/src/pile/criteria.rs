@@ -269,11 +269,17 @@ impl Curve {
     }
 
     /// A warning if elastic slip of the shaft's joints is a notable part of the settlement at half of the largest load,
-    /// in the last phase where the head moves away from where it was.
+    /// in the last phase where the head moves away from where it was and the load on it changes.
     pub(super) fn soft_shaft(&self) -> Option<String> {
+        let loads = self.in_place().flat_map(|phase| &phase.points);
+        let most = loads.fold(0.0, |m: f64, p| {
+            p[1..].iter().fold(m, |m, load| m.max(load.abs()))
+        });
         let phase = self.in_place().find(|phase| {
+            let loads = phase.points.iter().map(|point| point[1] - phase.start[1]);
             let away = phase.points.iter().map(|point| point[0] - phase.start[0]);
             away.fold(0.0, |m: f64, v| m.max(v.abs())) > 0.0
+                && loads.fold(0.0, |m: f64, v| m.max(v.abs())) > HELD * most
                 && phase.slips.iter().any(Option::is_some)
         })?;
         let largest = phase.points.iter().fold(0.0, |m: f64, p| m.max(p[1].abs()));
