@@ -307,6 +307,16 @@ fn a_pull_has_the_criteria_of_a_push() {
             assert!(pile[format!("{name}_reason")].is_string(), "{pile}");
         }
         if kind == "resistance" {
+            // The same push, and a pull in the same phase.
+            let turns = phases.replace(
+                "[[phase]]\n",
+                "[[phase]]\ncourse = [[0.0, 0.0], [0.5, 1.0], [1.0, -1.0]]\n",
+            );
+            let (place, _) = run(&ring(STIFFNESS * 2e-3, &turns));
+            let both = &place.summary()["pile"];
+            assert_eq!(both["phase"], "test", "{both}");
+            let [turned, straight] = [both, pile].map(|pile| number(pile, "resistance_chin"));
+            close(turned, straight, 0.1, "chin");
             for criterion in ["10_percent_diameter", "davisson"] {
                 let of = |part: &str| number(pile, &format!("resistance_{criterion}{part}"));
                 close(of("_shaft"), limit, 1e-6, "shaft");

@@ -189,12 +189,14 @@ impl Curve {
         self.phases.iter().rev().filter(|phase| phase.is_in_place)
     }
 
-    /// The last load test that ends with the head lower than it began.
+    /// The last load test in which the head goes lower than it began.
     fn last_push(&self) -> Option<&OfPhase> {
         let moves = |phase: &&OfPhase| {
-            let end = phase.points.last();
-            end.is_some_and(|end| end[0] > phase.start[0])
-                && phase.no_test(&phase.curve(1.0), 1.0).is_none()
+            let curve = phase.curve(1.0);
+            let most = curve
+                .iter()
+                .fold(0.0, |m: f64, point| m.max(point[0].abs()));
+            largest(&curve) > curve[0][0] + ROUND_OFF * most && phase.no_test(&curve, 1.0).is_none()
         };
         self.in_place().find(moves)
     }
