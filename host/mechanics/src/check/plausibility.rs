@@ -317,6 +317,19 @@ fn lost(problem: &Problem) -> Vec<String> {
             }
         }
     }
+    for (number, phase) in problem.phases.iter().enumerate() {
+        let active = problem.active_after(number + 1);
+        let lost = |(group, strain): &&(usize, [f64; 3])| {
+            !active[*group] && strain.iter().any(|value| *value != 0.0)
+        };
+        for (group, _) in phase.strain.iter().filter(lost) {
+            warnings.push(format!(
+                "phase `{}`: `strain` of group `{}` has no effect, since the group is not active. It counts as given: of a \
+                 later value only the difference acts",
+                phase.name, problem.groups[*group].name
+            ));
+        }
+    }
     for (number, group) in problem.groups.iter().enumerate() {
         let mut phases = problem.phases.iter();
         if !group.is_active && !phases.any(|phase| phase.activate.contains(&number)) {
