@@ -109,32 +109,35 @@ fn net_loads_are_changes_and_simpson_gives_the_shaft_load() {
         let history = rows(&place.path("out/history.csv"));
         let along = rows(&place.path("out/pile.csv"));
         let parts = ["head", "shaft", "base"];
-        let mut from: Option<Row> = None;
-        let mut last: Option<Row> = None;
-        for row in history {
+        let mut from: Option<[f64; 3]> = None;
+        let mut last: Option<(String, [f64; 3])> = None;
+        for row in &history {
             let phase = row["phase"].as_str();
-            let is_first = last
-                .as_ref()
-                .is_none_or(|last| last["phase"] != row["phase"]);
+            let is_first = last.as_ref().is_none_or(|(last, _)| *last != row["phase"]);
             if is_first && matches!(phase, "built" | "push") {
-                from.clone_from(&last);
+                from = last.map(|(_, loads)| loads);
             }
-            let own = of(&along, &row);
+            let own = of(&along, row);
             assert_eq!(own.len(), n, "{row:?}");
-            let load = |row: &Row, part: &str| value(row, &format!("pile_{part}_load"));
-            let scale = 1.0 + parts.iter().map(|part| load(&row, part).abs()).sum::<f64>();
             let girth = 2.0 * PI * 0.4;
-            let off = by_simpson(&own, "shaft_friction", girth) - load(&row, "shaft");
-            assert!(off.abs() < 1e-9 * scale, "{off} in {row:?}");
+            let [head, base] = [own[0], own[n - 1]].map(|row| value(row, "axial_force"));
+            let gross = [head, by_simpson(&own, "shaft_friction", girth), base];
+            last = Some((phase.to_owned(), gross));
             let Some(from) = &from else {
-                assert_eq!(row["pile_head_load_net"], "", "{row:?}");
+                for name in ["pile_head_load", "pile_head_load_net", "pile_dragload"] {
+                    assert_eq!(row[name], "", "{row:?}");
+                }
                 assert_eq!(own[0]["axial_force_net"], "", "{row:?}");
-                last = Some(row);
                 continue;
             };
-            let net = parts.map(|part| value(&row, &format!("pile_{part}_load_net")));
-            for (part, net) in parts.iter().zip(net) {
-                let change = load(&row, part) - load(from, part);
+            let loads = parts.map(|part| value(row, &format!("pile_{part}_load")));
+            let scale = 1.0 + loads.iter().map(|load| load.abs()).sum::<f64>();
+            for (load, gross) in loads.iter().zip(gross) {
+                assert!((load - gross).abs() < 1e-9 * scale, "{gross} in {row:?}");
+            }
+            let net = parts.map(|part| value(row, &format!("pile_{part}_load_net")));
+            for (part, net) in net.iter().enumerate() {
+                let change = loads[part] - from[part];
                 assert!((net - change).abs() < 1e-9 * scale, "{part} in {row:?}");
             }
             if phase != "built" {
@@ -146,10 +149,9 @@ fn net_loads_are_changes_and_simpson_gives_the_shaft_load() {
             let ends = [own[0], own[n - 1]].map(|row| value(row, "axial_force_net"));
             assert!((ends[0] - net[0]).abs() < 1e-9 * scale, "{row:?}");
             assert!((ends[1] - net[2]).abs() < 1e-9 * scale, "{row:?}");
-            last = Some(row);
         }
         // Where two laws meet, one row on either side.
-        let at = of(&along, last.as_ref().unwrap());
+        let at = of(&along, history.last().unwrap());
         let there = at
             .iter()
             .filter(|row| (value(row, "z") + 3.0).abs() < 1e-12);

@@ -13,10 +13,12 @@ use std::{io, iter};
 use text::Error;
 
 /// Columns of the resistances of piles.
-const OF_PILE: [&str; 3] = [
+const OF_PILE: [&str; 5] = [
     "pile.resistance_10_percent_diameter",
     "pile.resistance_davisson",
     "pile.resistance_chin",
+    "pile.uplift_10_percent_diameter",
+    "pile.uplift_davisson",
 ];
 
 /// A run, read back.
@@ -77,9 +79,11 @@ fn cells_of_pile(pile: Option<&Resistances>, columns: &[&str]) -> Vec<String> {
             pile.resistance_10_percent_diameter,
             pile.resistance_davisson,
             pile.resistance_chin,
+            pile.uplift_10_percent_diameter,
+            pile.uplift_davisson,
         ]
     };
-    let loads = pile.map_or([None; 3], loads);
+    let loads = pile.map_or([None; OF_PILE.len()], loads);
     let loads = loads.into_iter().take(columns.len());
     loads.map(|load| shown(&json!(load))).collect()
 }
@@ -276,7 +280,7 @@ mod tests {
                 "pile": pile,
             }))
         };
-        let reached = json!({ "resistance_davisson": 1234.5, "resistance_chin": null });
+        let reached = json!({ "resistance_davisson": 1234.5, "resistance_chin": null, "uplift_davisson": 7.5 });
         let runs = [
             with(2.0, "done", reached),
             with(3.0, "running", Value::Null),
@@ -284,9 +288,10 @@ mod tests {
         let names = ["a", "b, c"].map(str::to_owned);
         let expected = "\
             run,status,phase.load.increments,laws.soil.parameters.c,n,w,\
-            pile.resistance_10_percent_diameter,pile.resistance_davisson,pile.resistance_chin\n\
-            a,done,2,2,,2.1,,1234.5,\n\
-            \"b, c\",unfinished,3,3,,3.1,,,\n";
+            pile.resistance_10_percent_diameter,pile.resistance_davisson,pile.resistance_chin,\
+            pile.uplift_10_percent_diameter,pile.uplift_davisson\n\
+            a,done,2,2,,2.1,,1234.5,,,7.5\n\
+            \"b, c\",unfinished,3,3,,3.1,,,,,\n";
         assert_eq!(written(&names, &runs).unwrap(), expected);
     }
 
