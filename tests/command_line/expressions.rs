@@ -153,6 +153,10 @@ no such parameter
   cohesion = 10.0 => cohesion = ^"= soil.cohesion"
   law `soil` has no parameter `cohesion`
   young_modulus
+a choice
+  law = "elastic"\nparameters = { young_modulus = 1e4, poisson_ratio = 0.3 } => law = "mohr_coulomb"\nparameters = { young_modulus = 1e4, poisson_ratio = 0.3, cohesion = 1.0, friction_angle = 30.0, dilatancy_angle = 0.0 }
+  cohesion = 10.0 => cohesion = ^"= soil.scheme"
+  by default, no number
 a circle
   cohesion = 10.0 => cohesion = "= joint.friction_angle"
   friction_angle = 30.0 => friction_angle = ^"= 2 * joint.cohesion"
