@@ -270,3 +270,15 @@ fn a_pile_that_plunges_slides_and_its_base_yields() {
         .ended(NO_EQUILIBRIUM)
         .shows("asks for 900.0: the shaft slides and the base yields;");
 }
+
+/// Its own weight moves the pile, and no load its head.
+#[test]
+fn a_head_without_a_load_has_no_soft_shaft() {
+    let stiff = PILE.replace("young_modulus = 2e4", "young_modulus = 2e6");
+    let (text, rest) = stiff.split_once("[[phase]]\nname = \"push\"").unwrap();
+    let (_, pile) = rest.split_once("[pile]").unwrap();
+    let alone = format!("{text}[pile]{pile}");
+    Place::new()
+        .done_case(alone)
+        .hides("elastic slip of the shaft's joints");
+}
