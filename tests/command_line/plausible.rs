@@ -411,6 +411,65 @@ fn warns_of_peaks_between_increments() {
 }
 
 #[test]
+fn warns_of_a_strain_of_what_is_not_there() {
+    let with = |strain: &'static str| {
+        warnings(&[
+            ELASTIC,
+            (
+                "formulation = \"thin_layer\"",
+                "formulation = \"solid\"\nactive = false",
+            ),
+            (
+                "increments = 2\npressure = [{ line = \"top\", value = 10.0 }]",
+                strain,
+            ),
+            ("name = \"push\"", "name = \"push\"\nactivate = [\"layer\"]"),
+            (PUSH, "strain = { layer = 1e-6 }"),
+            (
+                "tau = { group = \"layer\", quantity = \"traction_t\" }\nhalf = { combine = { tau = 0.5 } }",
+                "",
+            ),
+        ])
+    };
+    let said = "phase `weight`: `strain` of group `layer` has no effect, since the group is not active. It counts as given: \
+                of a later value only the difference acts";
+    let is_said = |warnings: &[String]| warnings.iter().any(|warning| warning == said);
+    assert!(is_said(&with("increments = 2\nstrain = { layer = 1e-6 }")));
+    assert!(!is_said(&with("increments = 2\nstrain = { soil = 1e-6 }")));
+}
+
+#[test]
+fn water_above_ground_may_stand_on_a_cap() {
+    let level = |level: f64, cap: &str| {
+        let text = edited(&[
+            ELASTIC,
+            ("title", "water = { level = 1.0, unit_weight = 1.0 }\ntitle"),
+            (
+                "formulation = \"thin_layer\"",
+                "formulation = \"solid\"\npore_water = false",
+            ),
+            (
+                "group = \"layer\"\nx = [1.0, 1.01]",
+                "group = \"layer\"\nCAP",
+            ),
+            (
+                "tau = { group = \"layer\", quantity = \"traction_t\" }\nhalf = { combine = { tau = 0.5 } }",
+                "",
+            ),
+        ]);
+        let text = text
+            .replace("CAP", cap)
+            .replace("level = 1.0", &format!("level = {level}"));
+        Place::new()
+            .done_case(text)
+            .says("lies above the highest ground")
+    };
+    assert!(!level(1.0, "y = [0.5, 1.0]"));
+    assert!(level(1.2, "y = [0.5, 1.0]"));
+    assert!(level(1.2, "x = [1.0, 1.01]"));
+}
+
+#[test]
 fn tells_drivers_from_cases() {
     let place = Place::new();
     place.write("case.toml", CASE);
