@@ -74,9 +74,31 @@ fn values_over_the_height_count_at_the_element() {
     let range = &summary["laws"]["joint (interface_2d)"]["expressions"]["shear_stiffness"];
     assert_eq!(range["smallest"].as_f64(), Some(3e5));
     assert_eq!(range["largest"].as_f64(), Some(5e5));
-    let given = "shear_stiffness = 4e5 => shear_stiffness = { z = [[0.0, 2e5], [1.0, 6e5]] }";
-    let (_, given) = run(&upright(&[given]), &[]);
+    let over = "shear_stiffness = 4e5 => shear_stiffness = { z = [[0.0, 2e5], [1.0, 6e5]] }";
+    let follows_in = summary;
+    let (summary, given) = run(&upright(&[over]), &[]);
     assert_eq!(follows, given);
+    // There is no one value.
+    let of = |summary: &Value, id: &str| {
+        let joint = &summary["laws"]["joint (interface_2d)"];
+        let range = &joint["varying"][id];
+        (
+            joint["parameters"][id].as_f64(),
+            [&range["smallest"], &range["largest"]].map(Value::as_f64),
+        )
+    };
+    assert_eq!(
+        of(&follows_in, "shear_stiffness"),
+        (None, [Some(3e5), Some(5e5)])
+    );
+    assert_eq!(
+        of(&summary, "shear_stiffness"),
+        (None, [Some(2e5), Some(6e5)])
+    );
+    assert_eq!(of(&summary, "cohesion"), (Some(10.0), [None; 2]));
+    let place = Place::new();
+    place.done_case(upright(&[over]));
+    assert!(place.read("out/report.html").contains("200000 to 600000"));
 }
 
 /// Of E(z), at the centre of each element of the joint.
@@ -107,6 +129,10 @@ no such parameter
   cohesion = 10.0 => cohesion = ^"= soil.cohesion"
   law `soil` has no parameter `cohesion`
   young_modulus
+a choice
+  law = "elastic"\nparameters = { young_modulus = 1e4, poisson_ratio = 0.3 } => law = "mohr_coulomb"\nparameters = { young_modulus = 1e4, poisson_ratio = 0.3, cohesion = 1.0, friction_angle = 30.0, dilatancy_angle = 0.0 }
+  cohesion = 10.0 => cohesion = ^"= soil.scheme"
+  by default, no number
 a circle
   cohesion = 10.0 => cohesion = "= joint.friction_angle"
   friction_angle = 30.0 => friction_angle = ^"= 2 * joint.cohesion"

@@ -58,6 +58,17 @@ a displacement without a value
   displacement = [{ line = "top", x = 1e-5 }] => displacement = [{ line = ^"top" }]
   the displacement of line `top` has no value
   give `x`, `y`, or both
+water that weighs less than nothing
+  title = "A block beside a layer" => water = { level = 0.0, unit_weight = ^-9.81 }
+  the water's `unit_weight` is -9.81, expected a positive number
+a force without a value
+  displacement = [{ line = "top", x = 1e-5 }] => force = [{ line = ^"top" }]
+  the force of line `top` has no value
+  give `x`, `y`, or both
+a force where a displacement is prescribed
+  displacement = [{ line = "top", x = 1e-5 }] => displacement = [{ line = "top", x = 1e-5 }]\nforce = [{ line = ^"top", x = 1.0 }]
+  the force on line `top` has no effect in x
+  a displacement of this phase must be left out
 what nothing holds set free
   displacement = [{ line = "top", x = 1e-5 }] => free = [{ line = ^"top", components = ["x"] }]
   `free` of line `top`: nothing holds it in x

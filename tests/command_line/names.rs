@@ -179,6 +179,9 @@ no quantity
 an extent that holds nothing
   { group = "layer", quantity => ^{ y = [2.0, 3.0], group = "layer", quantity
   probe `tau`: no integration point lies inside the extent
+an extent the wrong way round
+  { group = "layer", quantity => ^{ y = [1.0, 0.0], group = "layer", quantity
+  probe `tau`: its extent is [1, 0], expected [smaller, larger]
 the mean of a force
   { line = "top", quantity = "displacement_y" => ^{ line = "top", reduce = "mean", quantity = "reaction_y"
   probe `settlement`: forces are summed

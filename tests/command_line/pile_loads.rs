@@ -109,32 +109,35 @@ fn net_loads_are_changes_and_simpson_gives_the_shaft_load() {
         let history = rows(&place.path("out/history.csv"));
         let along = rows(&place.path("out/pile.csv"));
         let parts = ["head", "shaft", "base"];
-        let mut from: Option<Row> = None;
-        let mut last: Option<Row> = None;
-        for row in history {
+        let mut from: Option<[f64; 3]> = None;
+        let mut last: Option<(String, [f64; 3])> = None;
+        for row in &history {
             let phase = row["phase"].as_str();
-            let is_first = last
-                .as_ref()
-                .is_none_or(|last| last["phase"] != row["phase"]);
+            let is_first = last.as_ref().is_none_or(|(last, _)| *last != row["phase"]);
             if is_first && matches!(phase, "built" | "push") {
-                from.clone_from(&last);
+                from = last.map(|(_, loads)| loads);
             }
-            let own = of(&along, &row);
+            let own = of(&along, row);
             assert_eq!(own.len(), n, "{row:?}");
-            let load = |row: &Row, part: &str| value(row, &format!("pile_{part}_load"));
-            let scale = 1.0 + parts.iter().map(|part| load(&row, part).abs()).sum::<f64>();
             let girth = 2.0 * PI * 0.4;
-            let off = by_simpson(&own, "shaft_friction", girth) - load(&row, "shaft");
-            assert!(off.abs() < 1e-9 * scale, "{off} in {row:?}");
+            let [head, base] = [own[0], own[n - 1]].map(|row| value(row, "axial_force"));
+            let gross = [head, by_simpson(&own, "shaft_friction", girth), base];
+            last = Some((phase.to_owned(), gross));
             let Some(from) = &from else {
-                assert_eq!(row["pile_head_load_net"], "", "{row:?}");
+                for name in ["pile_head_load", "pile_head_load_net", "pile_dragload"] {
+                    assert_eq!(row[name], "", "{row:?}");
+                }
                 assert_eq!(own[0]["axial_force_net"], "", "{row:?}");
-                last = Some(row);
                 continue;
             };
-            let net = parts.map(|part| value(&row, &format!("pile_{part}_load_net")));
-            for (part, net) in parts.iter().zip(net) {
-                let change = load(&row, part) - load(from, part);
+            let loads = parts.map(|part| value(row, &format!("pile_{part}_load")));
+            let scale = 1.0 + loads.iter().map(|load| load.abs()).sum::<f64>();
+            for (load, gross) in loads.iter().zip(gross) {
+                assert!((load - gross).abs() < 1e-9 * scale, "{gross} in {row:?}");
+            }
+            let net = parts.map(|part| value(row, &format!("pile_{part}_load_net")));
+            for (part, net) in net.iter().enumerate() {
+                let change = loads[part] - from[part];
                 assert!((net - change).abs() < 1e-9 * scale, "{part} in {row:?}");
             }
             if phase != "built" {
@@ -146,10 +149,9 @@ fn net_loads_are_changes_and_simpson_gives_the_shaft_load() {
             let ends = [own[0], own[n - 1]].map(|row| value(row, "axial_force_net"));
             assert!((ends[0] - net[0]).abs() < 1e-9 * scale, "{row:?}");
             assert!((ends[1] - net[2]).abs() < 1e-9 * scale, "{row:?}");
-            last = Some(row);
         }
         // Where two laws meet, one row on either side.
-        let at = of(&along, last.as_ref().unwrap());
+        let at = of(&along, history.last().unwrap());
         let there = at
             .iter()
             .filter(|row| (value(row, "z") + 3.0).abs() < 1e-12);
@@ -223,6 +225,28 @@ fn ground_that_sinks_drags_a_pile_down_above_its_neutral_plane() {
     }
 }
 
+/// Where the shaft slides, friction has a bend in the element of the neutral plane; the pile has no weight.
+#[test]
+fn load_and_dragload_are_the_largest_force_of_a_shaft_that_slides() {
+    let load = 100.0;
+    let phases = format!(
+        "[[phase]]\nname = \"load\"\nincrements = 1\nforce = [{{ line = \"head\", z = -{load} }}]\n\
+         [[phase]]\nname = \"drag\"\nincrements = 4\ndisplacement = [{{ line = \"top\", z = -0.01 }}]"
+    );
+    let (place, _) = run(&ring(12.0, &phases));
+    let history = rows(&place.path("out/history.csv"));
+    let mut dragged = 0;
+    for row in history
+        .iter()
+        .filter(|row| !row["pile_neutral_plane"].is_empty())
+    {
+        let sum = load + value(row, "pile_dragload");
+        close(value(row, "pile_max_axial_force"), sum, 1e-6, "sum");
+        dragged += 1;
+    }
+    assert!(dragged >= 3, "{history:?}");
+}
+
 #[test]
 fn cycles_are_those_by_hand() {
     // The joint slides at 2 mm: at 10 mm the load is r · 2 mm, and 1 mm back half of it.
@@ -288,6 +312,16 @@ fn a_pull_has_the_criteria_of_a_push() {
             assert!(pile[format!("{name}_reason")].is_string(), "{pile}");
         }
         if kind == "resistance" {
+            // The same push, and a pull in the same phase.
+            let turns = phases.replace(
+                "[[phase]]\n",
+                "[[phase]]\ncourse = [[0.0, 0.0], [0.5, 1.0], [1.0, -1.0]]\n",
+            );
+            let (place, _) = run(&ring(STIFFNESS * 2e-3, &turns));
+            let both = &place.summary()["pile"];
+            assert_eq!(both["phase"], "test", "{both}");
+            let [turned, straight] = [both, pile].map(|pile| number(pile, "resistance_chin"));
+            close(turned, straight, 0.1, "chin");
             for criterion in ["10_percent_diameter", "davisson"] {
                 let of = |part: &str| number(pile, &format!("resistance_{criterion}{part}"));
                 close(of("_shaft"), limit, 1e-6, "shaft");

@@ -337,6 +337,66 @@ fn warns_of_an_axis_that_is_free() {
     ]);
 }
 
+/// Without the probes of the traction in the layer.
+const NO_TRACTION: &str = "tau = { group = \"layer\", quantity = \"traction_t\" }\nhalf = { combine = { tau = 0.5 } } => ";
+
+#[test]
+fn warns_of_peaks_between_increments() {
+    let course = |n: usize, course: &str| {
+        let from = "increments = 2\ndisplacement = [{ line = \"top\", x = 1e-5 }]";
+        warnings(&[&format!(
+            "{from} => increments = {n}\ncourse = {course}\n{PUSH}"
+        )])
+    };
+    let peaks = "[[0, 0], [0.25, 1], [0.5, 0.2], [0.75, 1], [1, 0.2]]";
+    let said = "phase `push`: `course` turns at 0.25, 0.5 and 0.75 of its time, between the ends of its 7 increments: no \
+                row of the results has what is reached there; `increments = 8` meets all";
+    assert_eq!(course(7, peaks), [said]);
+    assert!(course(8, peaks).is_empty());
+    // It stays at its peak until an increment ends; and it does not turn.
+    assert!(course(2, "[[0, 0], [0.3, 1], [0.6, 1], [1, 0]]").is_empty());
+    assert!(course(2, "[[0, 0], [0.3, 0.1], [1, 1]]").is_empty());
+    assert_eq!(course(2, "[[0, 0], [0.3, 1], [0.4, 1], [1, 0]]").len(), 1);
+}
+
+#[test]
+fn warns_of_a_strain_of_what_is_not_there() {
+    let with = |strain: &str| {
+        warnings(&[
+            ELASTIC,
+            "formulation = \"thin_layer\" => formulation = \"solid\"\nactive = false",
+            &format!("increments = 2\npressure = [{{ line = \"top\", value = 10.0 }}] => {strain}"),
+            "name = \"push\" => name = \"push\"\nactivate = [\"layer\"]",
+            &format!("{PUSH} => strain = {{ layer = 1e-6 }}"),
+            NO_TRACTION,
+        ])
+    };
+    let said = "phase `weight`: `strain` of group `layer` has no effect, since the group is not active. It counts as given: \
+                of a later value only the difference acts";
+    let is_said = |warnings: &[String]| warnings.iter().any(|warning| warning == said);
+    assert!(is_said(&with("increments = 2\nstrain = { layer = 1e-6 }")));
+    assert!(!is_said(&with("increments = 2\nstrain = { soil = 1e-6 }")));
+}
+
+#[test]
+fn water_above_ground_may_stand_on_a_cap() {
+    let level = |level: f64, cap: &str| {
+        let text = edited(&[
+            ELASTIC,
+            &format!("title => water = {{ level = {level}, unit_weight = 1.0 }}\ntitle"),
+            "formulation = \"thin_layer\" => formulation = \"solid\"\npore_water = false",
+            &format!("group = \"layer\"\nx = [1.0, 1.01] => group = \"layer\"\n{cap}"),
+            NO_TRACTION,
+        ]);
+        Place::new()
+            .done_case(text)
+            .says("lies above the highest ground")
+    };
+    assert!(!level(1.0, "y = [0.5, 1.0]"));
+    assert!(level(1.2, "y = [0.5, 1.0]"));
+    assert!(level(1.2, "x = [1.0, 1.01]"));
+}
+
 #[test]
 fn tells_drivers_from_cases() {
     let place = Place::new();

@@ -79,13 +79,14 @@ fn piles_have_their_resistances() {
     place.write(
         "p/summary.json",
         r#"{"status": "no equilibrium", "probes": {"w": null},
-            "pile": {"resistance_davisson": 812.5, "resistance_chin": null}}"#,
+            "pile": {"resistance_davisson": 812.5, "resistance_chin": null, "uplift_davisson": 21.5}}"#,
     );
     let outcome = place.run(&["table", "p"]);
     assert_eq!(
         outcome.stdout,
         "run,status,w,pile.resistance_10_percent_diameter,pile.resistance_davisson,\
-         pile.resistance_chin\np,no equilibrium,,,812.5,\n"
+         pile.resistance_chin,pile.uplift_10_percent_diameter,pile.uplift_davisson\n\
+         p,no equilibrium,,,812.5,,,21.5\n"
     );
 }
 

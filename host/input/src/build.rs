@@ -21,7 +21,7 @@ use indexmap::IndexMap;
 use law::{BuiltLaw, Pins, SearchPath, hexadecimal_sha256};
 use mechanics::Simulation;
 use mechanics::check::{Cause, Item};
-use mechanics::mesh::{Line, Mesh};
+use mechanics::mesh::{Line, Mesh, Solid};
 use mechanics::problem::{ElementGroup, Ground, Material, Phase, Problem, Support, Water};
 use mechanics::settings::Control;
 use mechanics::simulation::Warning;
@@ -461,10 +461,10 @@ fn water_level(
     written: &Spanned<LevelInput>,
     mesh: &Mesh,
     is_ground: impl Fn(usize) -> bool,
+    is_cover: impl Fn(usize) -> bool,
 ) -> Result<Option<String>, Error> {
-    let highest = level(source, written)?
-        .values()
-        .fold(f64::NEG_INFINITY, f64::max);
+    let level = level(source, written)?;
+    let highest = level.values().fold(f64::NEG_INFINITY, f64::max);
     let (mut lowest, mut top) = (f64::INFINITY, f64::NEG_INFINITY);
     for solid in &mesh.solids {
         let is_ground = is_ground(solid.group);
@@ -474,13 +474,32 @@ fn water_level(
             top = if is_ground { top.max(at) } else { top };
         }
     }
+    let close = ABOVE * (top - lowest);
+    // A body without pores keeps the water off what it covers.
+    let is_covered = |x: f64| {
+        let covers = |solid: &Solid| {
+            let nodes = solid.nodes().iter().map(|&node| mesh.nodes[node]);
+            let ends = nodes.fold(
+                [f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY],
+                |e, at| [e[0].min(at[0]), e[1].max(at[0]), e[2].max(at[1])],
+            );
+            ends[0] <= x && x <= ends[1] && ends[2] >= level.at(x) - close
+        };
+        let mut cover = mesh.solids.iter().filter(|solid| is_cover(solid.group));
+        cover.any(covers)
+    };
+    let own = mesh.solids.iter().filter(|solid| is_ground(solid.group));
+    let is_free = || {
+        let mut nodes = own.flat_map(Solid::nodes).map(|&node| mesh.nodes[node]);
+        nodes.any(|[x, y]| y >= top - close && !is_covered(x))
+    };
     let place = source.place(&written.span());
     Ok(if highest < lowest {
         Some(format!(
             "{place}: the water table, {highest} m at its highest, lies below the lowest point of the mesh at {lowest} m: \
              the ground is dry"
         ))
-    } else if highest > top + ABOVE * (top - lowest) && top.is_finite() {
+    } else if top.is_finite() && highest > top + close && is_free() {
         Some(format!(
             "{place}: the water table, {highest} m at its highest, lies above the highest ground at {top} m: free water \
              loads its surface"
@@ -506,7 +525,8 @@ fn water_levels(
     let mut notes = Vec::new();
     let mut note = |written: &Spanned<LevelInput>, active: &[bool]| -> Result<(), Error> {
         let is_ground = |group: usize| active[group] && is_wet[group];
-        notes.extend(water_level(source, written, mesh, is_ground)?);
+        let is_cover = |group: usize| active[group] && !is_wet[group];
+        notes.extend(water_level(source, written, mesh, is_ground, is_cover)?);
         Ok(())
     };
     if let Some(water) = &file.water {

@@ -57,7 +57,8 @@ pub struct WaterInput {
     pub level: Spanned<LevelInput>,
     /// Unit weight of water, kN/m³.
     #[serde(default = "of_water")]
-    pub unit_weight: f64,
+    #[schemars(with = "f64")]
+    pub unit_weight: Spanned<f64>,
 }
 
 /// The water table of a phase.
@@ -81,8 +82,8 @@ pub enum LevelInput {
     Points(Vec<[f64; 2]>),
 }
 
-fn of_water() -> f64 {
-    9.81
+fn of_water() -> Spanned<f64> {
+    Spanned::new(0..0, 9.81)
 }
 
 /// The profile of a level over x.
@@ -105,7 +106,7 @@ impl WaterInput {
     pub(crate) fn read(&self, source: &Source) -> Result<Water, Error> {
         Ok(Water {
             level: level(source, &self.level)?,
-            unit_weight: self.unit_weight,
+            unit_weight: *self.unit_weight.get_ref(),
         })
     }
 }

@@ -351,7 +351,15 @@ impl Resolver<'_> {
             .filter(|&point| self.counts(group, point))
             .collect();
         if points.is_empty() {
-            return Err(self.wrong("no integration point lies inside the extent"));
+            let mut extents = [self.input.x, self.input.y].into_iter().flatten();
+            let turned = extents.find(|[from, to]| from >= to);
+            return Err(turned.map_or_else(
+                || self.wrong("no integration point lies inside the extent"),
+                |[from, to]| {
+                    let why = format!("its extent is [{from}, {to}], expected [smaller, larger]");
+                    self.wrong(&why)
+                },
+            ));
         }
         let reduce = self.input.reduce.unwrap_or(Reduce::Mean);
         let weights = if matches!(reduce, Reduce::Average | Reduce::Integral) {

@@ -35,8 +35,8 @@ table! {
         "the pressure on line `{line}` has no effect: its displacement against it is held or prescribed as long as \
          it lasts")
         hint (
-        "leave the pressure or the displacement out, or give the displacement up with `free`; `reaction_…` of \
-         the line is what it takes to hold it");
+        "leave the pressure or the displacement out, or give up a displacement of an earlier phase with `free`; \
+         `reaction_…` of the line is what it takes to hold it");
     Cause::NoElements(group) => ("no element belongs to group `{group}`");
     Cause::LayerOfTriangles(group) => (
         "group `{group}` is a thin layer, which is made of quads, and has triangles");
@@ -78,7 +78,7 @@ table! {
         "`free` of line `{line}` has no effect in {axis}: in the same phase `displacement` of line `{by}` \
          prescribes it")
         hint ("leave one of the two out; a displacement stays until a phase frees it");
-    Cause::NoValue(line, analysis) => ("the displacement of line `{line}` has no value")
+    Cause::NoValue(what, line, analysis) => ("the {what} of line `{line}` has no value")
         hint ("give `{}`, `{}`, or both", Axis::X.name(*analysis), Axis::Y.name(*analysis));
     Cause::HasSupport { line, at: [x, y], axis } => (
         "the node at ({x}, {y}) of line `{line}` has a support in {axis}")
@@ -149,8 +149,9 @@ table! {
         "the force on line `{line}` has no effect in {axis}: the line is held there, or its displacement is \
          prescribed, throughout")
         hint (
-        "`free = [{{ line = \"{line}\", components = [\"{axis}\"] }}]` in this phase gives the displacement up; \
-         `reaction_{axis}` of the line is what it takes to hold it");
+        "`free = [{{ line = \"{line}\", components = [\"{axis}\"] }}]` in this phase gives up a support or a displacement \
+         of an earlier phase; a displacement of this phase must be left out; `reaction_{axis}` of the line is what it \
+         takes to hold it");
     Cause::NoPoreStiffness { group, undrained, drained } => (
         "group `{group}`: `undrained_poisson_ratio` {undrained} does not exceed Poisson's ratio of its law, \
          {drained:.4}, so its pore water would have no stiffness");

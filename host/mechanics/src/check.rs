@@ -9,6 +9,7 @@ mod groups;
 mod ineffective_loads;
 mod loads_on_interfaces;
 mod mesh;
+mod peaks;
 mod phases;
 pub(crate) mod plausibility;
 mod refusal;

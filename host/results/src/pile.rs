@@ -191,9 +191,10 @@ pub struct State {
 }
 
 impl State {
-    /// In the order of [`COLUMNS`].
+    /// In the order of [`COLUMNS`]. Before the pile's interfaces are there it has no forces of its own.
     pub fn values(&self) -> [Option<f64>; COLUMNS.len()] {
-        let [head, shaft, base] = self.loads.of_parts().map(Some);
+        let gross = |force: f64| self.net.and(Some(force));
+        let [head, shaft, base] = self.loads.of_parts().map(gross);
         let net = |part: usize| self.net.map(|net| net[part]);
         [
             head,
@@ -203,9 +204,9 @@ impl State {
             net(0),
             net(1),
             net(2),
-            self.downdrag.neutral_plane,
-            Some(self.downdrag.max_axial_force),
-            Some(self.downdrag.dragload),
+            self.net.and(self.downdrag.neutral_plane),
+            gross(self.downdrag.max_axial_force),
+            gross(self.downdrag.dragload),
         ]
     }
 }

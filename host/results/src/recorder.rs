@@ -490,7 +490,7 @@ impl Recorder {
 
     /// At which load of its head the pile found no further equilibrium.
     pub fn plunge(&self, simulation: &Simulation, none: &NoEquilibrium) -> Option<String> {
-        self.pile.as_ref()?.pile.plunge(simulation, none)
+        self.pile.as_ref()?.plunge(simulation, none)
     }
 
     /// Resistances of the pile, if there is one.

@@ -10,6 +10,7 @@
 mod budget;
 mod comparison;
 mod fields;
+mod law;
 mod log;
 mod model;
 mod number_format;

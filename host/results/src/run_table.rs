@@ -13,10 +13,12 @@ use std::path::{Path, PathBuf};
 use text::Error;
 
 /// Columns of the resistances of piles.
-const OF_PILE: [&str; 3] = [
+const OF_PILE: [&str; 5] = [
     "pile.resistance_10_percent_diameter",
     "pile.resistance_davisson",
     "pile.resistance_chin",
+    "pile.uplift_10_percent_diameter",
+    "pile.uplift_davisson",
 ];
 
 /// A run, read back.
@@ -77,9 +79,11 @@ fn cells_of_pile(pile: Option<&Resistances>, columns: &[&str]) -> Vec<String> {
             pile.resistance_10_percent_diameter,
             pile.resistance_davisson,
             pile.resistance_chin,
+            pile.uplift_10_percent_diameter,
+            pile.uplift_davisson,
         ]
     };
-    let loads = pile.map_or([None; 3], loads);
+    let loads = pile.map_or([None; OF_PILE.len()], loads);
     let loads = loads.into_iter().take(columns.len());
     loads.map(|load| shown(&json!(load))).collect()
 }
@@ -269,7 +273,7 @@ mod tests {
                 "pile": pile,
             }))
         };
-        let reached = json!({ "resistance_davisson": 1234.5, "resistance_chin": null });
+        let reached = json!({ "resistance_davisson": 1234.5, "resistance_chin": null, "uplift_davisson": 7.5 });
         let runs = [
             with(2.0, "done", reached),
             with(3.0, "running", Value::Null),
@@ -277,9 +281,10 @@ mod tests {
         let names = ["a", "b, c"].map(str::to_owned);
         let expected = "\
             run,status,phase.load.increments,laws.soil.parameters.c,n,w,\
-            pile.resistance_10_percent_diameter,pile.resistance_davisson,pile.resistance_chin\n\
-            a,done,2,2,,2.1,,1234.5,\n\
-            \"b, c\",unfinished,3,3,,3.1,,,\n";
+            pile.resistance_10_percent_diameter,pile.resistance_davisson,pile.resistance_chin,\
+            pile.uplift_10_percent_diameter,pile.uplift_davisson\n\
+            a,done,2,2,,2.1,,1234.5,,,7.5\n\
+            \"b, c\",unfinished,3,3,,3.1,,,,,\n";
         assert_eq!(written(&names, &runs).unwrap(), expected);
     }
 
@@ -321,6 +326,19 @@ mod tests {
         assert_eq!(shown(&json!(2.1e8)), "2.1e8");
         assert_eq!(shown(&json!(20)), "20");
         assert_eq!(shown(&json!([1, 2])), "[1,2]");
+    }
+
+    #[test]
+    fn parameters_over_the_height_differ_by_their_ranges() {
+        let with = |smallest: f64| {
+            let c = json!({ "smallest": smallest, "largest": 30.0 });
+            let law = json!({ "law": "l", "parameters": { "c": null }, "varying": { "c": c } });
+            run(json!({ "status": "done", "laws": { "a (interface_2d)": law } }))
+        };
+        let names = ["a", "b"].map(str::to_owned);
+        let table = written(&names, &[with(10.0), with(20.0)]).unwrap();
+        let expected = "run,status,laws.a.parameters.c\na,done,10 to 30\nb,done,20 to 30\n";
+        assert_eq!(table, expected);
     }
 
     /// A key that only one file gives counts as different; a law that one run lacks is no column.

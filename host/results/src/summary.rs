@@ -201,6 +201,17 @@ pub(crate) struct Law {
     pub(crate) initial: Named<f64>,
     #[serde(skip_serializing_if = "Named::is_empty")]
     pub(crate) expressions: Named<Expression>,
+    /// Parameters without one value: over the height, or from group to group.
+    #[serde(skip_serializing_if = "Named::is_empty")]
+    pub(crate) varying: Named<Range>,
+}
+
+/// The smallest and largest value of a parameter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Range {
+    pub(crate) smallest: f64,
+    pub(crate) largest: f64,
 }
 
 /// A parameter that follows from others, with its smallest and largest value.

@@ -1,7 +1,7 @@
 //! What is wrong or odd about a pile, and where it is written.
 
 use super::{BAR, PILE, rows, run, value};
-use crate::program::{BAD_INPUT, DONE, Place, refuses_file};
+use crate::program::{BAD_INPUT, DONE, NO_EQUILIBRIUM, Place, refuses_file};
 use serde_json::Value;
 use std::f64::consts::PI;
 use tests::words::{edited, rows_of};
@@ -218,4 +218,32 @@ fn forces_out_of_balance_are_told_as_a_share_of_the_largest_load() {
     let said = format!("phase `push`</dt><dd>{:.2} kN", residual(push.unwrap()));
     let report = place.read("out/report.html");
     assert!(report.contains(&said), "{said}");
+}
+
+/// A foot in clay: a bearing capacity of some 6 c_u = 120 kPa; the shaft slides at 10 kPa from 180 kN on.
+#[test]
+fn a_pile_that_plunges_slides_and_its_base_yields() {
+    let clay = PILE
+        .replace("law = \"elastic\", parameters = { young_modulus = 2e4, poisson_ratio = 0.3 }", "law = \"mohr_coulomb\", parameters = { young_modulus = 2e4, poisson_ratio = 0.3, cohesion = 20.0, friction_angle = 0.0, dilatancy_angle = 0.0 }")
+        .replace("k_0 = 0.5", "k_0 = 1.0")
+        .replace("cohesion = 8.0, friction_angle = 15.0", "cohesion = 10.0, friction_angle = 0.0, tensile_strength = 200.0")
+        .replace("displacement = [{ line = \"head\", z = -0.09 }]", "force = [{ line = \"head\", z = -900.0 }]");
+    let (text, rest) = clay.split_once("[[phase]]\nname = \"pull\"").unwrap();
+    let (_, pile) = rest.split_once("[pile]").unwrap();
+    let outcome = Place::new().run_case(format!("{text}[pile]{pile}"));
+    outcome
+        .ended(NO_EQUILIBRIUM)
+        .shows("asks for 900.0: the shaft slides and the base yields;");
+}
+
+/// Its own weight moves the pile, and no load its head.
+#[test]
+fn a_head_without_a_load_has_no_soft_shaft() {
+    let stiff = PILE.replace("young_modulus = 2e4", "young_modulus = 2e6");
+    let (text, rest) = stiff.split_once("[[phase]]\nname = \"push\"").unwrap();
+    let (_, pile) = rest.split_once("[pile]").unwrap();
+    let alone = format!("{text}[pile]{pile}");
+    Place::new()
+        .done_case(alone)
+        .hides("elastic slip of the shaft's joints");
 }

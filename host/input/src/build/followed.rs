@@ -173,9 +173,13 @@ impl LawShelf<'_> {
         let table = self.tables().parameters(entry);
         let written = table.iter().find(|(key, _)| key.get_ref() == id);
         let Some((_, written)) = written else {
-            let default = declared.default.filter(|_| declared.choices.is_empty());
-            let message = || format!("`{name}` has no value: it is left out and has no default");
-            return default.ok_or_else(|| wrong(&asked.by, message()).into());
+            let choice = |number: f64| declared.choices.get(number as usize);
+            let message = match declared.default.map(|number| (number, choice(number))) {
+                Some((number, None)) => return Ok(number),
+                Some((_, Some(label))) => format!("`{name}` is \"{label}\" by default, no number"),
+                None => format!("`{name}` has no value: it is left out and has no default"),
+            };
+            return Err(wrong(&asked.by, message).into());
         };
         let value = self.written(&name, written, own, asked)?;
         if declared.choices.is_empty() && !declared.bounds.contain(value) {

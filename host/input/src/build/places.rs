@@ -50,7 +50,7 @@ impl Case {
                 laws.find(|key| key.get_ref() == name).map(Spanned::span)
             }
             Item::Support(number) => file.supports.get(*number).map(|s| s.line.span()),
-            Item::Water(None) => file.water.as_ref().map(|w| w.get_ref().level.span()),
+            Item::Water(None) => file.water.as_ref().map(|w| w.get_ref().unit_weight.span()),
             Item::Activation {
                 phase: of,
                 group: number,

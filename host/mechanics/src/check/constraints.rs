@@ -234,7 +234,11 @@ impl<'a> Constraints<'a> {
         let line = input.line.as_str();
         let refuse = |cause| Err(Refusal::new(item.clone(), cause));
         if input.x.is_none() && input.y.is_none() {
-            return refuse(Cause::NoValue(line.to_owned(), self.problem.analysis));
+            return refuse(Cause::NoValue(
+                "displacement",
+                line.to_owned(),
+                self.problem.analysis,
+            ));
         }
         for (axis, value) in [(Axis::X, input.x), (Axis::Y, input.y)] {
             let Some(value) = value else { continue };

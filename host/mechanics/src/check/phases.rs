@@ -330,7 +330,7 @@ fn forces(
         }
         lines.push(name);
         if input.x.is_none() && input.y.is_none() {
-            return refuse(Cause::NoValue(name.to_owned(), problem.analysis));
+            return refuse(Cause::NoValue("force", name.to_owned(), problem.analysis));
         }
         if [input.x, input.y]
             .into_iter()

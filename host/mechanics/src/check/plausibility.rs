@@ -42,6 +42,7 @@ pub(crate) fn warnings(
     warnings.extend(weights(problem));
     warnings.extend(dry_weights(problem));
     warnings.extend(lost(problem));
+    warnings.extend(super::peaks::warnings(problem));
     warnings.extend(super::uncovered_loads::warnings(problem));
     warnings.extend(beside_undrained(problem));
     warnings.extend(water_inside(problem));
@@ -314,6 +315,19 @@ fn lost(problem: &Problem) -> Vec<String> {
                     phase.name, group.name
                 ));
             }
+        }
+    }
+    for (number, phase) in problem.phases.iter().enumerate() {
+        let active = problem.active_after(number + 1);
+        let lost = |(group, strain): &&(usize, [f64; 3])| {
+            !active[*group] && strain.iter().any(|value| *value != 0.0)
+        };
+        for (group, _) in phase.strain.iter().filter(lost) {
+            warnings.push(format!(
+                "phase `{}`: `strain` of group `{}` has no effect, since the group is not active. It counts as given: of a \
+                 later value only the difference acts",
+                phase.name, problem.groups[*group].name
+            ));
         }
     }
     for (number, group) in problem.groups.iter().enumerate() {

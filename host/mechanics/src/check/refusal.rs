@@ -207,7 +207,7 @@ pub enum Cause {
         by: String,
     },
     /// A displacement without a value.
-    NoValue(String, Analysis),
+    NoValue(&'static str, String, Analysis),
     /// A displacement where a support holds.
     HasSupport {
         /// The line.

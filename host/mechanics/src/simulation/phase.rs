@@ -14,6 +14,7 @@ use crate::group::Group;
 use crate::problem::Axis;
 use crate::settings::{self, Method, Settings};
 use algebra::{Block, LinearSolver, Singular};
+use std::collections::HashSet;
 
 /// The equations of one phase.
 #[derive(Debug)]
@@ -29,8 +30,9 @@ pub(super) struct PhaseEquations {
     /// What the residual of the last step was measured against, by body, and its tolerance; nothing
     /// before the first step.
     pub(super) measured: Option<(Vec<f64>, f64)>,
-    /// Forces out of balance at the start, relative to the forces in play.
-    out_of_balance: f64,
+    /// Forces out of balance at the start, relative to the forces in play: all, and without those that the phase
+    /// releases.
+    out_of_balance: [f64; 2],
     n_unknowns: usize,
     /// Factorisations and fallbacks in the phase that the solver does not count, modulo 2⁶⁴.
     counted: [u64; 2],
@@ -91,7 +93,7 @@ impl Simulation {
         self.set_swelling(number, 0);
         self.count_swelling();
         let (equations, loads) = self.equations_of(number, loads, None)?;
-        let imbalance = equations.out_of_balance;
+        let [imbalance, unasked] = equations.out_of_balance;
         let weight = crate::equilibrium::norm(&loads.force_start);
         let has_weight = self.loading[0]
             .unit_weight
@@ -101,8 +103,8 @@ impl Simulation {
         if number == 0 && has_weight && weight > 0.0 {
             watch.at_rest(&name, imbalance * self.largest_force / weight);
         }
-        if imbalance > f64::max(NOTABLE, self.settings().force_tolerance) {
-            watch.warning(&Warning::OutOfBalance(name.clone(), imbalance));
+        if unasked > f64::max(NOTABLE, self.settings().force_tolerance) {
+            watch.warning(&Warning::OutOfBalance(name.clone(), unasked));
         }
         let record = PhaseRecord {
             method: self.settings().method,
@@ -314,10 +316,10 @@ impl Simulation {
         let begins = domain.as_ref().filter(|_| standing.is_none());
         let internal = begins.map(|domain| domain.internal_forces(&self.groups));
         let out_of_balance = if let Some(course) = course {
-            course.record.out_of_balance
+            [course.record.out_of_balance; 2]
         } else {
             let beside = domain.as_ref().zip(internal.as_deref());
-            self.out_of_balance(&unknowns, beside, &mut loads)
+            self.out_of_balance(number, &unknowns, beside, &mut loads)
         };
         if course.is_none()
             && self.problem.settings.tolerance_of == settings::ToleranceOf::ActiveLoad
@@ -450,15 +452,16 @@ impl Simulation {
     }
 
     /// Internal less external forces at the start of a phase where nothing holds them (after a
-    /// swap of laws, a support given up, an initial stress, ground removed). Returns the size, relative to
-    /// the forces in play, of those that nobody asked for: without what ground that is removed carried.
+    /// swap of laws, a support given up, an initial stress, ground removed). Returns their size, relative to
+    /// the forces in play, without what ground that is removed carried; and the same without what `free` gives up.
     /// Internal forces of a domain `beside` the equations are known.
     fn out_of_balance(
         &mut self,
+        number: usize,
         unknowns: &[usize],
         beside: Option<(&LinearDomain, &[f64])>,
         loads: &mut Loads,
-    ) -> f64 {
+    ) -> [f64; 2] {
         let n_dofs = self.displacement.len();
         let mut internal = match beside {
             Some((_, of_domain)) => of_domain.to_vec(),
@@ -474,12 +477,19 @@ impl Simulation {
         let mut released = self.released.clone();
         fold(&self.tied, &mut released);
         loads.out_of_balance = vec![0.0; n_dofs];
-        let (mut rest, mut against_end, mut play) = (0.0, 0.0, 0.0);
+        let free = self.problem.phases[number].free.iter();
+        let free: HashSet<usize> = free
+            .flat_map(|free| self.dofs(&free.line, &free.components))
+            .collect();
+        let (mut rest, mut against_end, mut play) = ([0.0; 2], [0.0; 2], 0.0);
         for &dof in unknowns {
             let difference = internal[dof] - loads.force_start[dof];
             loads.out_of_balance[dof] = difference;
-            rest += (difference + released[dof]).powi(2);
-            against_end += (internal[dof] - loads.force_end[dof]).powi(2);
+            let unasked = f64::from(!free.contains(&dof));
+            for (sum, weight) in [1.0, unasked].into_iter().enumerate() {
+                rest[sum] += weight * (difference + released[dof]).powi(2);
+                against_end[sum] += weight * (internal[dof] - loads.force_end[dof]).powi(2);
+            }
         }
         for (internal, external) in internal.iter().zip(&loads.force_start) {
             play += f64::max(internal * internal, external * external);
@@ -501,11 +511,11 @@ impl Simulation {
             *largest = largest.max(now);
         }
         // An initial stress that the loads of its own phase balance is in balance.
-        let rest = rest.min(against_end);
+        let share = |sum: usize| f64::sqrt(rest[sum].min(against_end[sum])) / self.largest_force;
         if play > 0.0 {
-            f64::sqrt(rest) / self.largest_force
+            [share(0), share(1)]
         } else {
-            0.0
+            [0.0; 2]
         }
     }
 }

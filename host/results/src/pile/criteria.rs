@@ -139,6 +139,11 @@ impl Curve {
         self.phases.iter()
     }
 
+    /// Settlement, and gross loads of head, shaft and base, after the last increment.
+    pub(super) fn last(&self) -> Option<[f64; 4]> {
+        self.last
+    }
+
     pub(crate) fn phase(
         &mut self,
         phase: &str,
@@ -184,12 +189,14 @@ impl Curve {
         self.phases.iter().rev().filter(|phase| phase.is_in_place)
     }
 
-    /// The last load test that ends with the head lower than it began.
+    /// The last load test in which the head goes lower than it began.
     fn last_push(&self) -> Option<&OfPhase> {
         let moves = |phase: &&OfPhase| {
-            let end = phase.points.last();
-            end.is_some_and(|end| end[0] > phase.start[0])
-                && phase.no_test(&phase.curve(1.0), 1.0).is_none()
+            let curve = phase.curve(1.0);
+            let most = curve
+                .iter()
+                .fold(0.0, |m: f64, point| m.max(point[0].abs()));
+            largest(&curve) > curve[0][0] + ROUND_OFF * most && phase.no_test(&curve, 1.0).is_none()
         };
         self.in_place().find(moves)
     }
@@ -264,11 +271,17 @@ impl Curve {
     }
 
     /// A warning if elastic slip of the shaft's joints is a notable part of the settlement at half of the largest load,
-    /// in the last phase where the head moves away from where it was.
+    /// in the last phase where the head moves away from where it was and the load on it changes.
     pub(super) fn soft_shaft(&self) -> Option<String> {
+        let loads = self.in_place().flat_map(|phase| &phase.points);
+        let most = loads.fold(0.0, |m: f64, p| {
+            p[1..].iter().fold(m, |m, load| m.max(load.abs()))
+        });
         let phase = self.in_place().find(|phase| {
+            let loads = phase.points.iter().map(|point| point[1] - phase.start[1]);
             let away = phase.points.iter().map(|point| point[0] - phase.start[0]);
             away.fold(0.0, |m: f64, v| m.max(v.abs())) > 0.0
+                && loads.fold(0.0, |m: f64, v| m.max(v.abs())) > HELD * most
                 && phase.slips.iter().any(Option::is_some)
         })?;
         let largest = phase.points.iter().fold(0.0, |m: f64, p| m.max(p[1].abs()));

@@ -7,6 +7,8 @@ use super::rows::{Row, Span};
 const NONE: f64 = 1e-6;
 /// The ground drags the pile down over this share of the shaft's length at least, or not at all.
 const LEAST: f64 = 0.1;
+/// Pieces of an element in which friction counts as of one direction.
+const PIECES: usize = 64;
 
 /// Effect on a pile of ground that settles more than the pile.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -51,13 +53,12 @@ impl Downdrag {
                 continue;
             }
             let forces = [upper, upper + 1].map(|row| stations[row].axial_force);
-            let piece = piece(spans, rows, upper);
-            // Between the two rows friction is linear, and the force is a parabola.
-            let bend = 0.5 * piece * (pair[1] - pair[0]) * t * (1.0 - t);
+            let bend = Element::at(spans, rows, &friction, upper)
+                .map_or(0.0, |element| element.bend(upper, t));
             return Self {
                 neutral_plane: Some(plane),
                 max_axial_force: forces[0] + t * (forces[1] - forces[0]) + bend,
-                dragload: dragload(spans, rows, &friction, upper),
+                dragload: dragload(spans, rows, &friction, (upper, t)),
             };
         }
         none
@@ -77,47 +78,67 @@ fn friction(stations: &[Station]) -> Vec<f64> {
     stations.iter().map(|s| of(s).unwrap_or(0.0)).collect()
 }
 
-/// Area of the shaft between a row and the next, m².
-fn piece(spans: &[Span], rows: &[Row], upper: usize) -> f64 {
-    let of = |row: &Row| row.at.iter().map(|(span, _)| *span).collect::<Vec<_>>();
-    let below = of(&rows[upper + 1]);
-    let both = of(&rows[upper])
-        .into_iter()
-        .find(|span| below.contains(span));
-    let is_height = rows[upper].z > rows[upper + 1].z;
-    both.filter(|_| is_height)
-        .map_or(0.0, |span| 0.5 * spans[span].area)
+/// An element of the shaft, along which friction is a parabola.
+struct Element {
+    /// Its upper row; the middle and the lower one follow.
+    first: usize,
+    /// m².
+    area: f64,
+    /// At the three rows, kPa.
+    friction: [f64; 3],
 }
 
-/// The downward friction down to the one between a row and the next.
-fn dragload(spans: &[Span], rows: &[Row], friction: &[f64], last: usize) -> f64 {
+impl Element {
+    /// The one between a row and the next.
+    fn at(spans: &[Span], rows: &[Row], friction: &[f64], row: usize) -> Option<Self> {
+        let below = &rows.get(row + 1)?.at;
+        let is_next = |(span, part): &&(usize, usize)| below.contains(&(*span, part + 1));
+        let &(span, part) = rows[row].at.iter().find(is_next)?;
+        let first = row - part;
+        Some(Self {
+            first,
+            area: spans[span].area,
+            friction: *friction.get(first..)?.first_chunk()?,
+        })
+    }
+
+    /// The force of friction on its part from the top to a share of its height, kN.
+    fn force(&self, share: f64) -> f64 {
+        let [a, m, b] = self.friction;
+        let [slope, curvature] = [4.0 * m - 3.0 * a - b, 2.0 * (a - 2.0 * m + b)];
+        self.area * share * (a + share * (slope / 2.0 + share * curvature / 3.0))
+    }
+
+    /// What the axial force at a part `t` of the way from a row to the next exceeds that on the straight line by, kN.
+    fn bend(&self, row: usize, t: f64) -> f64 {
+        let start = 0.5 * (row - self.first) as f64;
+        let [above, here, below] = [0.0, 0.5 * t, 0.5].map(|further| self.force(start + further));
+        t * (below - above) - (here - above)
+    }
+}
+
+/// The downward friction above a place: row, and part of the way to the next.
+fn dragload(spans: &[Span], rows: &[Row], friction: &[f64], (last, t): (usize, f64)) -> f64 {
     let mut sum = 0.0;
     let mut row = 0;
     while row <= last {
-        let area = piece(spans, rows, row);
-        let of_three = friction[row..].first_chunk();
-        // The three rows of an element along which the ground only drags down are integrated by Simpson's rule.
-        let is_element = rows[row + 1].at.iter().any(|(_, part)| *part == 1);
-        if let Some(&[a, m, b]) = of_three
-            && is_element
-            && row < last
-            && a.max(m).max(b) <= 0.0
-        {
-            sum += 2.0 * area * (a + 4.0 * m + b) / 6.0;
-            row += 2;
+        let Some(element) = Element::at(spans, rows, friction, row) else {
+            // Rows of two laws at one height, or no shaft.
+            row += 1;
             continue;
-        }
-        let [a, b] = [friction[row], friction[row + 1]];
-        let [low, high] = [a.min(b), a.max(b)];
-        sum += area
-            * if low >= 0.0 {
-                0.0
-            } else if high <= 0.0 {
-                f64::midpoint(a, b)
-            } else {
-                -0.5 * low * low / (high - low)
-            };
-        row += 1;
+        };
+        let end = f64::min(1.0, 0.5 * ((last - row) as f64 + t));
+        let above = &friction[row..=last.min(row + 2)];
+        sum += if above.iter().all(|value| *value <= 0.0) {
+            element.force(end)
+        } else {
+            let pieces = (PIECES as f64 * end).ceil() as usize;
+            let at = |piece: usize| element.force(end * piece as f64 / pieces as f64);
+            (0..pieces)
+                .map(|piece| f64::min(at(piece + 1) - at(piece), 0.0))
+                .sum()
+        };
+        row += 2;
     }
     -sum
 }

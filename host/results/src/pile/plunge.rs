@@ -1,6 +1,6 @@
 //! The message about a pile that finds no further equilibrium.
 
-use super::{Base, Pile};
+use super::{Base, Curve, Pile};
 use mechanics::equilibrium::Mechanism;
 use mechanics::group::FailureMode;
 use mechanics::problem::Phase;
@@ -8,11 +8,21 @@ use mechanics::{NoEquilibrium, Problem, Simulation};
 
 /// A force above this multiple of the load carried was probably typed in another unit.
 const MANY: f64 = 20.0;
+/// A part of the pile that takes less than this share of the pile's first stiffness gives way.
+const LOST: f64 = 0.05;
+/// A base that takes less than this share of the head's load bears nothing.
+const BEARS: f64 = 0.01;
+const SLIDES: &str = "the shaft slides";
 
 impl Pile {
     /// At which net load of the head a phase of forces found no further equilibrium, what gives way and what to do, in
     /// one sentence. `None` unless the pile is in place and the phase changes a force on its head along a straight ramp.
-    pub(crate) fn plunge(&self, simulation: &Simulation, none: &NoEquilibrium) -> Option<String> {
+    pub(super) fn plunge(
+        &self,
+        simulation: &Simulation,
+        none: &NoEquilibrium,
+        curve: &Curve,
+    ) -> Option<String> {
         let problem = simulation.problem();
         let mut names = problem.phases.iter().map(|phase| &phase.name);
         let number = names.position(|name| *name == none.place.phase)?;
@@ -45,8 +55,33 @@ impl Pile {
         Some(format!(
             "pile: {way} of {carried_net:.1} {unit} (net), where phase `{}` asks for {end_net:.1}{}; {advice}",
             phase.name,
-            self.mechanism(simulation, none, sign < 0.0)
+            self.mechanism(simulation, none, (sign < 0.0).then_some(curve))
         ))
+    }
+
+    /// Whether shaft and base of a pile that is pushed have lost their stiffness, by its curve up to the last equilibrium.
+    fn lost(&self, simulation: &Simulation, phase: &str, curve: &Curve) -> [bool; 2] {
+        let of_phase = curve.phases().find(|of| of.phase == phase);
+        let (Some(of_phase), Some(last)) = (of_phase, curve.last()) else {
+            return [false; 2];
+        };
+        let mut points = vec![of_phase.start()];
+        points.extend(&of_phase.points);
+        let mut steps: Vec<[f64; 4]> = points
+            .windows(2)
+            .map(|pair| step(pair[0], pair[1]))
+            .collect();
+        if let Some(state) = self.state(&simulation.snapshot()) {
+            let [head, shaft, base] = state.loads.of_parts();
+            steps.push(step(last, [state.loads.settlement, head, shaft, base]));
+        }
+        steps.retain(|step| step[0] > 0.0);
+        let [first, .., last] = steps[..] else {
+            return [false; 2];
+        };
+        let is_lost = |part: usize| last[part] / last[0] < LOST * first[1] / first[0];
+        let bears = points.iter().any(|point| point[3] > BEARS * point[1].abs());
+        [is_lost(2), is_lost(3) && bears]
     }
 
     /// The vertical force that a phase puts on the head, if it does.
@@ -78,8 +113,17 @@ impl Pile {
         resets.or_else(begins).unwrap_or(0)
     }
 
-    /// What of the pile gives way in the last attempt at a step, in words after a colon.
-    fn mechanism(&self, simulation: &Simulation, none: &NoEquilibrium, is_pushed: bool) -> String {
+    /// What of the pile gives way in the last attempt at a step, in words after a colon. `pushed`: its curve, if it is
+    /// pushed.
+    fn mechanism(
+        &self,
+        simulation: &Simulation,
+        none: &NoEquilibrium,
+        pushed: Option<&Curve>,
+    ) -> String {
+        let [shaft_lost, base_lost] = pushed.map_or([false; 2], |curve| {
+            self.lost(simulation, &none.place.phase, curve)
+        });
         let (groups, time) = (simulation.groups(), simulation.time());
         let worst = none.failure.mechanism.as_ref();
         let is_at =
@@ -94,7 +138,11 @@ impl Pile {
             .iter()
             .map(|&number| groups[number].kinematics.n_points());
         let worst_of_shaft = worst.filter(|_| shaft.iter().any(|&number| is_at(number)));
-        let of_shaft = of_shaft(&modes, points.sum(), worst_of_shaft);
+        let of_shaft = if shaft_lost {
+            Some(SLIDES)
+        } else {
+            of_shaft(&modes, points.sum(), worst_of_shaft)
+        };
         let mut said = Vec::from_iter(of_shaft);
         let bears =
             |mode: FailureMode| !matches!(mode, FailureMode::Opens | FailureMode::BondBreaks);
@@ -105,8 +153,8 @@ impl Pile {
         };
         let in_ground =
             |worst: &Mechanism| matches!(worst.how, FailureMode::Yields | FailureMode::ComesApart);
-        if is_below || worst.is_some_and(in_ground) {
-            let part = if is_pushed {
+        if base_lost || is_below || worst.is_some_and(in_ground) {
+            let part = if pushed.is_some() {
                 "the base yields"
             } else {
                 "the ground yields"
@@ -133,9 +181,10 @@ fn of_shaft(
         Some(how) if !most_give => matches!(how, FailureMode::Opens | FailureMode::BondBreaks),
         _ => 2 * slide.count() < modes.len(),
     };
-    (most_give || worst.is_some()).then_some(if opens {
-        "the shaft opens"
-    } else {
-        "the shaft slides"
-    })
+    (most_give || worst.is_some()).then_some(if opens { "the shaft opens" } else { SLIDES })
+}
+
+/// The change from one point of a curve to another.
+fn step(from: [f64; 4], to: [f64; 4]) -> [f64; 4] {
+    std::array::from_fn(|i| to[i] - from[i])
 }

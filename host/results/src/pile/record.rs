@@ -3,7 +3,7 @@
 use super::{Curve, Net, Pile, Resistances, State, Stations, cycles};
 use crate::file::Extent;
 use mechanics::simulation::Snapshot;
-use mechanics::{Place, Simulation};
+use mechanics::{NoEquilibrium, Place, Simulation};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use text::Error;
@@ -120,6 +120,11 @@ impl Record {
         };
         self.curve.add(state, slip);
         Ok(())
+    }
+
+    /// At which load of its head it found no further equilibrium.
+    pub(crate) fn plunge(&self, simulation: &Simulation, none: &NoEquilibrium) -> Option<String> {
+        self.pile.plunge(simulation, none, &self.curve)
     }
 
     /// Unit of its forces.

@@ -3,6 +3,7 @@
 use super::budget::MANY;
 use super::comparison::{final_values, settings, subject, varied};
 use super::fields::Fields;
+use super::law::law;
 use super::log::Log;
 use super::model::Model;
 use super::number_format::display;
@@ -11,7 +12,7 @@ use super::profile::Profile;
 use super::results::{Ending, History, Run};
 use super::{filled, internal};
 use crate::mesh_error::OfPhase;
-use crate::summary::{Figure, Head, Law, Resistances, Section, Summary};
+use crate::summary::{Figure, Head, Resistances, Section, Summary};
 use minijinja::value::Serde;
 use minijinja::{Value as Template, context};
 use serde::{Deserialize, Serialize};
@@ -457,32 +458,6 @@ fn resistances(summary: &Summary) -> Vec<(String, String)> {
         Some((name, format!("{:.2} {}", phase.residual_force?, pile.unit)))
     });
     criteria.into_iter().filter_map(said).chain(left).collect()
-}
-
-fn law((name, law): (&String, &Law)) -> Template {
-    let number = |value: Option<f64>| value.map(display).unwrap_or_default();
-    let described = law.described_parameters.iter().map(|p| {
-        context! {
-            value => p.choice.clone().unwrap_or_else(|| number(p.value)),
-            ..Template::from(Serde(p))
-        }
-    });
-    let mut parameters: Vec<Template> = described.collect();
-    if parameters.is_empty() {
-        let plain = |(id, value): (&String, &Option<f64>)| context! { id, value => number(*value) };
-        parameters = law.parameters.iter().map(plain).collect();
-    }
-    context! {
-        name,
-        parameters,
-        variables => Template::from(Serde(&law.internal_variables)),
-        id => law.law.as_str(),
-        called => law.name.as_str(),
-        doc => law.doc.as_str(),
-        references => law.references.as_str(),
-        version => law.version.as_str(),
-        sha256 => law.sha256.as_str(),
-    }
 }
 
 /// A name in words.

@@ -5,11 +5,11 @@ use crate::mesh_error::OfPhase;
 use crate::output_request::{self, OutputRequest};
 use crate::summary::{
     self, CaseFile, Ending, Expression, Figure, Group, Head, Law, LawCalls, LeftOpen, Measured,
-    Mesh, MeshFile, Named, Parameter, Phase, PhaseSeconds, Seconds, ShearZone, Stop, Summary,
-    Variable,
+    Mesh, MeshFile, Named, Parameter, Phase, PhaseSeconds, Range, Seconds, ShearZone, Stop,
+    Summary, Variable,
 };
 use indexmap::IndexMap;
-use law::BuiltLaw;
+use law::{BuiltLaw, UsedParameter};
 use mechanics::group::Group as GroupOfModel;
 use mechanics::problem::Variation;
 use mechanics::simulation::{Increment, Neighbour, PhaseRecord};
@@ -275,7 +275,13 @@ fn head(about: &About, wanted: &OutputRequest, simulation: &Simulation) -> Head 
     };
     let laws = about.laws.iter().map(|((name, hypothesis), built)| {
         let mut law = law(built, initial(simulation, name, built));
-        law.expressions = expressions(simulation, about, name, built);
+        let materials: Vec<&Material> = materials(simulation, name, built).collect();
+        let own = about.expressions.iter().filter(|[law, ..]| law == name);
+        vary(
+            &mut law,
+            ranges(&materials, built),
+            &own.collect::<Vec<_>>(),
+        );
         (format!("{name} ({hypothesis})"), law)
     });
     let pictures = wanted.figures.iter();
@@ -389,12 +395,7 @@ fn figure(figure: &output_request::Figure) -> Figure {
 
 /// What the case gives a law to start from, by internal variable.
 fn initial(simulation: &Simulation, name: &str, built: &BuiltLaw) -> Named<f64> {
-    let problem = simulation.problem();
-    let of_groups = problem.groups.iter().map(|group| &group.material);
-    let of_phases = problem.phases.iter().flat_map(|phase| &phase.materials);
-    let mut all = of_groups.chain(of_phases.map(|(_, material)| material));
-    let same =
-        all.find(|material| material.name == name && std::ptr::eq(material.built.as_ref(), built));
+    let same = materials(simulation, name, built).next();
     let variables = &built.law.formulation().internal_variables;
     let given = same.into_iter().flat_map(|material| &material.initial);
     given
@@ -402,43 +403,63 @@ fn initial(simulation: &Simulation, name: &str, built: &BuiltLaw) -> Named<f64> 
         .collect()
 }
 
-/// Parameters of a law that follow from others, with their smallest and largest values in all groups.
-fn expressions(
-    simulation: &Simulation,
-    about: &About,
+/// The law of the case, wherever a group takes it.
+fn materials<'p>(
+    simulation: &'p Simulation,
     name: &str,
     built: &BuiltLaw,
-) -> Named<Expression> {
+) -> impl Iterator<Item = &'p Material> {
     let problem = simulation.problem();
     let of_phases = problem.phases.iter().flat_map(|phase| &phase.materials);
-    let of_phases = of_phases.map(|(_, material)| material);
-    let materials = problem.groups.iter().map(|group| &group.material);
-    let materials: Vec<&Material> = materials
-        .chain(of_phases)
-        .filter(|material| material.name == name && std::ptr::eq(material.built.as_ref(), built))
-        .collect();
-    let own = about.expressions.iter().filter(|[law, ..]| law == name);
-    let range = |id: &str| {
-        let used = built.parameters.iter().filter(|used| used.id == id);
-        let used = used.map(|used| used.value);
-        let varying = materials.iter().flat_map(|material| &material.varying);
-        let varying = varying.filter(|(of, _)| of == id);
-        let elements = varying.flat_map(|(_, variation)| match variation {
-            Variation::Elements(values) => values.as_slice(),
-            Variation::Height(_) => &[],
-        });
-        ends(used.chain(elements.copied()))
+    let of_groups = problem.groups.iter().map(|group| &group.material);
+    of_groups
+        .chain(of_phases.map(|(_, material)| material))
+        .filter(move |material| {
+            material.name == name && std::ptr::eq(material.built.as_ref(), built)
+        })
+}
+
+/// The range of every parameter of a law in all groups.
+fn ranges(materials: &[&Material], built: &BuiltLaw) -> Named<Range> {
+    let range = |used: &UsedParameter| {
+        let of_material = |material: &&Material| -> Vec<f64> {
+            let mut varying = material.varying.iter();
+            match varying.find(|(id, _)| *id == used.id) {
+                Some((_, Variation::Height(profile))) => profile.values().collect(),
+                Some((_, Variation::Elements(values))) => values.clone(),
+                None => vec![used.value],
+            }
+        };
+        let unused = materials.is_empty().then_some(used.value);
+        let values = materials.iter().flat_map(of_material).chain(unused);
+        let [smallest, largest] = ends(values);
+        (used.id.clone(), Range { smallest, largest })
     };
-    own.map(|[_, id, expression]| {
-        let [smallest, largest] = range(id);
+    built.parameters.iter().map(range).collect()
+}
+
+/// Adds to a law the parameters that follow from others, and those that have no one value.
+fn vary(law: &mut Law, ranges: Named<Range>, expressions: &[&[String; 3]]) {
+    let of_expression = |[_, id, expression]: &&[String; 3]| {
+        let Range { smallest, largest } = ranges.get(id).copied().unwrap_or_default();
         let expression = Expression {
             expression: expression.clone(),
             smallest,
             largest,
         };
         (id.clone(), expression)
-    })
-    .collect()
+    };
+    law.expressions = expressions.iter().map(of_expression).collect();
+    law.varying = ranges;
+    law.varying
+        .retain(|_, range| range.smallest < range.largest);
+    for id in law.varying.keys() {
+        law.parameters.insert(id.clone(), None);
+    }
+    let described = law.described_parameters.iter_mut();
+    for parameter in described.filter(|parameter| law.varying.contains_key(&parameter.id)) {
+        parameter.value = None;
+    }
 }
 
 fn law(built: &BuiltLaw, initial: Named<f64>) -> Law {
@@ -487,6 +508,7 @@ fn law(built: &BuiltLaw, initial: Named<f64>) -> Law {
         }),
         initial,
         expressions: Named::new(),
+        varying: Named::new(),
     }
 }
 

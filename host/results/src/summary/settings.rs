@@ -1,6 +1,6 @@
 //! What a run was run with, for whatever compares runs.
 
-use crate::summary::{Group, Head, Law, Summary};
+use crate::summary::{Group, Head, Law, Range, Summary};
 use serde_json::{Map, Value, json};
 use std::path::PathBuf;
 use text::{Source, base, key};
@@ -131,10 +131,13 @@ impl Settings {
             let mut described = law.described_parameters.iter();
             let described = described.find(|p| p.id == *parameter);
             let choice = described.and_then(|p| p.choice.as_ref());
-            let (value, unit) = match (choice, described) {
+            let unit = described.map_or("", |described| described.unit.as_str());
+            let (value, unit) = match (choice, law.varying.get(parameter)) {
                 (Some(choice), _) => (json!(choice), ""),
-                (None, Some(described)) => (json!(value), described.unit.as_str()),
-                (None, None) => (json!(value), ""),
+                (None, Some(Range { smallest, largest })) => {
+                    (json!(format!("{smallest} to {largest}")), unit)
+                }
+                (None, None) => (json!(value), unit),
             };
             let path = ["laws", id, "parameters", parameter];
             self.with_unit([&section, parameter], Some(&path), value, unit);
