@@ -97,8 +97,8 @@ pub(crate) fn run(text: &str) -> (Place, String) {
     (place, outcome.stdout)
 }
 
-/// Head and weight against shaft and base, in every row; the ends of the pile against both. Before its interfaces are
-/// there the pile has no forces of its own.
+/// Head and weight against shaft and base, in every row; the ends of the pile against both. Rows before the interfaces
+/// are active have no forces.
 fn assert_closes(place: &Place, weight: impl Fn(&Row) -> f64) {
     let stations = rows(&place.path("out/pile.csv"));
     for row in rows(&place.path("out/history.csv")) {

@@ -225,7 +225,7 @@ fn ground_that_sinks_drags_a_pile_down_above_its_neutral_plane() {
     }
 }
 
-/// Where the shaft slides, friction has a bend in the element of the neutral plane; the pile has no weight.
+/// Friction on a sliding shaft has a bend in the element of the neutral plane. The pile has no weight.
 #[test]
 fn load_and_dragload_are_the_largest_force_of_a_shaft_that_slides() {
     let load = 100.0;

@@ -16,9 +16,6 @@
 
 use super::round_off::exact;
 
-/// The displacement criterion is waived where the residual is this far below its tolerance: a
-/// linear step ends after one correction, which is as large as the increment itself.
-pub(super) const EXACT: f64 = 1e-3;
 /// Share of the tolerances that a correction with a kept matrix, and the residual it leaves, must not exceed; neither
 /// is waived then.
 pub(super) const STALE: f64 = 0.1;

@@ -2,11 +2,12 @@
 //! and of a correction, body by body, are handed there.
 
 use super::Newton;
-use super::acceptance::{Criteria, EXACT, Measures, STALE};
+use super::acceptance::{Criteria, Measures, STALE};
 use super::failure::{Criterion, Unmet};
 use super::iterate::State;
 use super::outcome::{Iteration, Open};
 use super::residual::{Balance, Task};
+use super::round_off::EXACT;
 use crate::settings::Convergence;
 use law::Operator;
 use std::collections::BTreeMap;

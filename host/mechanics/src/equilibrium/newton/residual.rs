@@ -1,6 +1,6 @@
 //! Evaluation: what displacement increments leave out of balance.
 
-use super::{Newton, ROUND_OFF, reference_of_round_off};
+use super::{Newton, ROUND_OFF, norm, reference_of_round_off};
 use crate::assembly::norms;
 use crate::group::{Committed, Group, PointFailure};
 use law::Operator;
@@ -86,7 +86,7 @@ impl Newton<'_> {
         if let Some(active) = active {
             for scale in &mut scales {
                 let least = reference_of_round_off(*scale, self.settings.force_tolerance);
-                *scale = active.clamp(least.min(*scale), *scale);
+                *scale = active.max(least).min(*scale);
             }
         }
         if has_moved {
@@ -129,7 +129,7 @@ impl Newton<'_> {
     fn active_load(&self, internal: &[f64]) -> Option<f64> {
         let carried = self.start.carried.as_slice();
         let changes = internal.iter().zip(carried).map(|(now, start)| now - start);
-        (!carried.is_empty()).then(|| changes.map(|change| change * change).sum::<f64>().sqrt())
+        (!carried.is_empty()).then(|| norm(&changes.collect::<Vec<_>>()))
     }
 
     /// Takes note of the interfaces of which a point opens in the trial state.

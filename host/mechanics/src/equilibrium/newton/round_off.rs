@@ -1,12 +1,14 @@
 //! What rounding leaves of forces that should cancel.
 
 use super::Newton;
-use super::acceptance::EXACT;
 use super::outcome::Iteration;
 use super::residual::{Balance, Task};
 use crate::assembly::norms;
 use law::Operator;
 
+/// The displacement criterion is waived where the residual is this far below its tolerance: a
+/// linear step ends after one correction, which is as large as the increment itself.
+pub(super) const EXACT: f64 = 1e-3;
 /// Largest relative residual that may be round-off.
 pub(crate) const STILL_SMALL: f64 = 1e-6;
 /// Round-off that a state may have, in changes of its forces by the last bit of the displacement
