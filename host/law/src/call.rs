@@ -1,7 +1,6 @@
 //! Calls of a law and their results. A batch of points goes in as a [`Start`] and comes back in an [`End`], which borrow
 //! the arrays of the caller; a [`PointCall`] is the call of one point, kept by value.
 
-use crate::description::is_false;
 use abi::raw::{self, Status};
 use abi::status::Outcome;
 use serde::{Deserialize, Serialize};
@@ -125,7 +124,7 @@ pub struct Moment {
     #[serde(rename = "length", default = "one")]
     pub step_length: f64,
     /// Pore water does not leave.
-    #[serde(rename = "undrained", default, skip_serializing_if = "is_false")]
+    #[serde(rename = "undrained", default)]
     pub is_undrained: bool,
 }
 
@@ -300,34 +299,16 @@ pub enum Request {
     InitialState,
 }
 
-/// Numbers by their bits: JSON has no infinity.
-pub(crate) mod bits {
-    use serde::{Deserialize, Deserializer, Serializer};
-
-    pub(crate) fn serialize<S: Serializer>(values: &[f64], to: S) -> Result<S::Ok, S::Error> {
-        to.collect_seq(values.iter().map(|value| value.to_bits()))
-    }
-
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
-        let bits = Vec::<u64>::deserialize(from)?;
-        Ok(bits.into_iter().map(f64::from_bits).collect())
-    }
-}
-
 /// A point at the start of an increment, and its gradient at the end.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PointStart {
     /// Gradient at the start.
-    #[serde(with = "bits")]
     pub gradient0: Vec<f64>,
     /// Gradient at the end.
-    #[serde(with = "bits")]
     pub gradient1: Vec<f64>,
     /// Flux at the start.
-    #[serde(with = "bits")]
     pub flux0: Vec<f64>,
     /// Internal variables at the start.
-    #[serde(with = "bits")]
     pub state0: Vec<f64>,
 }
 

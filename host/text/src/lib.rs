@@ -5,6 +5,7 @@
 //! on each other. Nothing here knows what the keys mean.
 
 pub mod base;
+pub mod digits;
 mod error;
 mod error_display;
 pub mod file;

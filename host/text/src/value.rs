@@ -30,24 +30,34 @@ impl<'i> Value<'i> {
         Self { value, span }
     }
 
-    /// Hands it over as it is.
+    /// Without its place. Only this is compiled anew for every type that is read, so the work is in [`Self::plain`].
     fn visit<V: Visitor<'i>>(self, visitor: V) -> Result<V::Value, Misfit> {
-        match self.value {
-            DeValue::String(text) => visitor.visit_string(text.into_owned()),
-            DeValue::Integer(number) => match integer(&number) {
-                Some(Integer::Signed(number)) => visitor.visit_i64(number),
-                Some(Integer::Unsigned(number)) => visitor.visit_u64(number),
-                None => Err(wrong(&DeValue::Integer(number), &visitor)),
-            },
+        match self.plain(&visitor)? {
+            Plain::Text(text) => visitor.visit_string(text),
+            Plain::Signed(number) => visitor.visit_i64(number),
+            Plain::Unsigned(number) => visitor.visit_u64(number),
+            Plain::Number(number) => visitor.visit_f64(number),
+            Plain::Truth(value) => visitor.visit_bool(value),
+            Plain::List(entries) => visitor.visit_seq(entries),
+            Plain::Table(pairs) => visitor.visit_map(pairs),
+        }
+    }
+
+    fn plain(self, expected: &dyn de::Expected) -> Result<Plain<'i>, Misfit> {
+        Ok(match self.value {
+            DeValue::String(text) => Plain::Text(text.into_owned()),
+            DeValue::Integer(number) => {
+                integer(&number).ok_or_else(|| wrong(&DeValue::Integer(number), expected))?
+            }
             DeValue::Float(number) => match number.as_str().parse::<f64>() {
                 // The infinite ones of TOML have no digits.
                 Ok(value) if value.is_infinite() && number.as_str().contains(is_digit) => {
-                    Err(de::Error::custom("floating-point number overflowed"))
+                    return Err(de::Error::custom("floating-point number overflowed"));
                 }
-                Ok(value) => visitor.visit_f64(value),
-                Err(_) => Err(wrong(&DeValue::Float(number), &visitor)),
+                Ok(value) => Plain::Number(value),
+                Err(_) => return Err(wrong(&DeValue::Float(number), expected)),
             },
-            DeValue::Boolean(value) => visitor.visit_bool(value),
+            DeValue::Boolean(value) => Plain::Truth(value),
             // No type here is one.
             DeValue::Datetime(date) => {
                 let at = self.span;
@@ -56,11 +66,11 @@ impl<'i> Value<'i> {
                     Spanned::new(at.clone(), "date".into()),
                     Spanned::new(at, text),
                 );
-                visitor.visit_map(Pairs::new([entry].into_iter().collect()))
+                Plain::Table(Pairs::new([entry].into_iter().collect()))
             }
-            DeValue::Array(entries) => visitor.visit_seq(Entries(entries.into_iter())),
-            DeValue::Table(table) => visitor.visit_map(Pairs::new(table)),
-        }
+            DeValue::Array(entries) => Plain::List(Entries(entries.into_iter())),
+            DeValue::Table(table) => Plain::Table(Pairs::new(table)),
+        })
     }
 
     /// The same where this is asked for.
@@ -78,15 +88,22 @@ fn is_digit(c: char) -> bool {
     c.is_ascii_digit()
 }
 
-enum Integer {
+/// A value of a file as serde knows it.
+enum Plain<'i> {
+    Text(String),
     Signed(i64),
     Unsigned(u64),
+    Number(f64),
+    Truth(bool),
+    List(Entries<'i>),
+    Table(Pairs<'i>),
 }
 
-fn integer(number: &DeInteger<'_>) -> Option<Integer> {
+/// A whole number, if it has at most 64 bits.
+fn integer<'i>(number: &DeInteger<'_>) -> Option<Plain<'i>> {
     let (digits, radix) = (number.as_str(), number.radix());
-    let signed = i64::from_str_radix(digits, radix).map(Integer::Signed);
-    let unsigned = || u64::from_str_radix(digits, radix).map(Integer::Unsigned);
+    let signed = i64::from_str_radix(digits, radix).map(Plain::Signed);
+    let unsigned = || u64::from_str_radix(digits, radix).map(Plain::Unsigned);
     signed.or_else(|_| unsigned()).ok()
 }
 
@@ -269,6 +286,23 @@ impl<'i> Pairs<'i> {
         let rest = table.into_iter();
         Self { rest, taken: None }
     }
+
+    /// Takes the next pair; its key.
+    fn next_key(&mut self) -> Option<Value<'i>> {
+        let (key, value) = self.rest.next()?;
+        self.taken = Some((key.get_ref().clone(), value));
+        Some(Value {
+            span: key.span(),
+            value: DeValue::String(key.into_inner()),
+        })
+    }
+
+    /// The key that was taken last, and its value.
+    fn last(&mut self) -> Result<(DeString<'i>, Value<'i>), Misfit> {
+        let taken = self.taken.take();
+        let (key, value) = taken.ok_or_else(|| Misfit::new(Kind::Other("no key".to_owned())))?;
+        Ok((key, Value::new(value)))
+    }
 }
 
 impl<'i> MapAccess<'i> for Pairs<'i> {
@@ -278,24 +312,18 @@ impl<'i> MapAccess<'i> for Pairs<'i> {
         &mut self,
         seed: K,
     ) -> Result<Option<K::Value>, Misfit> {
-        let Some((key, value)) = self.rest.next() else {
+        let Some(key) = self.next_key() else {
             return Ok(None);
         };
-        self.taken = Some((key.get_ref().clone(), value));
-        let span = key.span();
-        let key = Value {
-            value: DeValue::String(key.into_inner()),
-            span: span.clone(),
-        };
+        let span = key.span.clone();
         let read = seed.deserialize(key);
         read.map(Some).map_err(|misfit| misfit.at(&span))
     }
 
     fn next_value_seed<T: DeserializeSeed<'i>>(&mut self, seed: T) -> Result<T::Value, Misfit> {
-        let taken = self.taken.take();
-        let (key, value) = taken.ok_or_else(|| Misfit::new(Kind::Other("no key".to_owned())))?;
-        let span = value.span();
-        let read = seed.deserialize(Value::new(value));
+        let (key, value) = self.last()?;
+        let span = value.span.clone();
+        let read = seed.deserialize(value);
         read.map_err(|misfit| misfit.of_key(&span, &key))
     }
 

@@ -15,7 +15,6 @@ use law::probe::PointStart;
 use law::probe::call_log::{Function, KeptCall};
 use std::path::Path;
 use std::time::Duration;
-use text::file;
 use text::write::replace;
 
 /// Points of a law that are called for in another process.
@@ -154,7 +153,7 @@ fn results(
 ) -> Result<Result<Vec<Results>, String>, Error> {
     let scratch = Scratch::new()?;
     let file = scratch.path().join("calls");
-    std::fs::write(&file, serde_json::to_vec(calls).map_err(internal)?).map_err(internal)?;
+    std::fs::write(&file, postcard::to_stdvec(calls).map_err(internal)?).map_err(internal)?;
     let mut arguments = vec!["check".into(), subject.path.clone().into()];
     arguments.extend(["--child".into(), file.clone().into(), "--calls".into()]);
     let outcome = child::run(&Work {
@@ -162,8 +161,8 @@ fn results(
         ..Work::new(arguments, PATIENCE)
     })
     .map_err(internal)?;
-    let answer = file::read_text(&answered(&file)).ok();
-    let answer = answer.and_then(|text| serde_json::from_slice(&text).ok());
+    let answer = std::fs::read(answered(&file)).ok();
+    let answer = answer.and_then(|bytes| postcard::from_bytes(&bytes).ok());
     Ok(answer.ok_or_else(|| Called::Law.ends(outcome.ending)))
 }
 
@@ -173,12 +172,12 @@ fn results(
 /// The calls cannot be read, or the results not written.
 pub(super) fn answer(subject: &Subject, file: &Path) -> Result<(), Error> {
     let calls = std::fs::read(file).map_err(internal)?;
-    let calls: Vec<KeptCall> = serde_json::from_slice(&calls).map_err(internal)?;
+    let calls: Vec<KeptCall> = postcard::from_bytes(&calls).map_err(internal)?;
     let results: Vec<Results> = calls
         .iter()
         .map(|call| repeated(subject, call).map_err(|verdict| verdict.why))
         .collect();
-    let results = serde_json::to_string(&results).map_err(internal)?;
+    let results = postcard::to_stdvec(&results).map_err(internal)?;
     Ok(replace(&answered(file), results)?)
 }
 

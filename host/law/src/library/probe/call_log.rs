@@ -11,8 +11,6 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 
 // Of the whole process by nature: it is the process that ends.
 static KEPT: OnceLock<Mutex<Keeper>> = OnceLock::new();
-/// Digits that tell how long the text behind them is; what is behind that is of earlier calls.
-const DIGITS: usize = 12;
 
 /// The function of a law that is called.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -110,7 +108,6 @@ pub struct KeptCall {
     /// How it is called.
     pub form: Form,
     /// Values of the parameters.
-    #[serde(with = "crate::call::bits")]
     pub parameters: Vec<f64>,
     /// The points.
     pub points: Vec<PointStart>,
@@ -128,10 +125,9 @@ impl KeptCall {
 impl Kept {
     /// What was begun last; `None` if nothing was.
     pub fn last(path: &Path) -> Option<Self> {
-        let bytes = std::fs::read(path).ok()?;
-        let (length, rest) = bytes.split_at_checked(DIGITS)?;
-        let length: usize = std::str::from_utf8(length).ok()?.parse().ok()?;
-        serde_json::from_slice(rest.get(..length)?).ok()
+        // What is behind it is of earlier calls.
+        let (last, _) = postcard::take_from_bytes(&std::fs::read(path).ok()?).ok()?;
+        Some(last)
     }
 }
 
@@ -180,9 +176,8 @@ pub fn keep_phase(phase: KeptPhase) -> io::Result<()> {
 
 impl Keeper {
     fn write(&mut self, kept: &Kept) -> io::Result<()> {
-        let text = serde_json::to_string(kept)?;
+        let bytes = postcard::to_stdvec(kept).map_err(io::Error::other)?;
         self.file.rewind()?;
-        self.file
-            .write_all(format!("{:0DIGITS$}{text}", text.len()).as_bytes())
+        self.file.write_all(&bytes)
     }
 }

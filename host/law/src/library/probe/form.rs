@@ -97,10 +97,8 @@ pub struct Form {
     /// Length of the increment in time.
     pub time_increment: f64,
     /// Numbers of step and increment for a routine; by default those of [`Form::when`].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub moment: Option<Moment>,
     /// Coordinates of the points for a routine.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub site: Option<Site>,
     /// Ask for the consistent tangent even of a law that declares none; else its elastic operator
     /// is in, as in a run.

@@ -99,8 +99,9 @@ struct Heap(Box<[std::cell::UnsafeCell<u64>]>);
 
 impl Heap {
     fn new(length: usize) -> Self {
-        let words = length.div_ceil(size_of::<u64>());
-        Self((0..words).map(|_| std::cell::UnsafeCell::new(0)).collect())
+        let words = Box::new_zeroed_slice(length.div_ceil(size_of::<u64>()));
+        // SAFETY: a word of zeros is a number.
+        Self(unsafe { words.assume_init() })
     }
 
     fn start(&self) -> *mut u8 {
