@@ -15,6 +15,7 @@ use law::probe::PointStart;
 use law::probe::call_log::{Function, KeptCall};
 use std::path::Path;
 use std::time::Duration;
+use text::file;
 use text::write::replace;
 
 /// Points of a law that are called for in another process.
@@ -161,7 +162,7 @@ fn results(
         ..Work::new(arguments, PATIENCE)
     })
     .map_err(internal)?;
-    let answer = std::fs::read(answered(&file)).ok();
+    let answer = file::read_text(&answered(&file)).ok();
     let answer = answer.and_then(|bytes| postcard::from_bytes(&bytes).ok());
     Ok(answer.ok_or_else(|| Called::Law.ends(outcome.ending)))
 }

@@ -125,7 +125,7 @@ impl KeptCall {
 impl Kept {
     /// What was begun last; `None` if nothing was.
     pub fn last(path: &Path) -> Option<Self> {
-        // What is behind it is of earlier calls.
+        // Bytes behind it are of earlier, longer records.
         let (last, _) = postcard::take_from_bytes(&std::fs::read(path).ok()?).ok()?;
         Some(last)
     }
