@@ -2,10 +2,11 @@
 
 use crate::model::{AtNodes, Model, Quantity, Step};
 use crate::{Error, MODEL, Program, calculix, kratos, opengeosys, vtu};
-use results::{comma_separated, number};
+use results::comma_separated;
 use serde_json::{Map, Value, json};
 use std::io;
 use std::path::{Path, PathBuf};
+use text::digits::number;
 use text::write::replace;
 
 /// What a program found at the end of a step, by node.

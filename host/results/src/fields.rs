@@ -3,7 +3,6 @@
 use crate::file;
 use crate::output_request::{Output, When};
 use crate::pressures::Pressure;
-use crate::table::{push_count, push_shortest};
 use mechanics::Simulation;
 use mechanics::element::Kind;
 use mechanics::group::Group;
@@ -14,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use text::Error;
+use text::digits::{push_count, push_shortest};
 use text::write::replace;
 
 /// VTK's number of the kind of cell with this many nodes: quadratic edges (elements without thickness) or solids.

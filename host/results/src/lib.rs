@@ -34,7 +34,7 @@ pub use mesh_table::MeshTable;
 pub use output_request::OutputRequest;
 pub use recorder::{Fault, Recorder, ResultsState};
 pub use summary::{About, Ending, LawsOfGroup, Phase, Summary, end_summary};
-pub use table::{comma_separated, number};
+pub use table::comma_separated;
 
 /// The least and the greatest of some values; +∞ and -∞ if there are none.
 fn ends(values: impl Iterator<Item = f64>) -> [f64; 2] {

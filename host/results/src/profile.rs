@@ -5,12 +5,13 @@ use crate::output_request::When;
 use crate::pressures::Pressure;
 use crate::recorder::internal_variables;
 use crate::report::{Point, Profiles};
-use crate::table::{Cell, Table, push, push_count, push_text};
+use crate::table::{Cell, Table, push_text};
 use mechanics::group::Group;
 use mechanics::simulation::Snapshot;
 use mechanics::{Place, Simulation};
 use std::path::Path;
 use text::Error;
+use text::digits::{push, push_count};
 
 /// `profile.csv`: one row per integration point of every active thin layer and
 /// zero-thickness group.

@@ -6,8 +6,7 @@
 use crate::file::{Appended, Extent};
 use std::path::PathBuf;
 use text::Error;
-pub use text::digits::number;
-pub(crate) use text::digits::{push, push_count, push_shortest};
+use text::digits::{push, push_count};
 
 /// Appends a cell of a CSV file, in quotation marks where it needs them.
 pub(crate) fn push_text(row: &mut Vec<u8>, text: &str) {

@@ -1,4 +1,4 @@
-//! Numbers of tables and fields as text. They are written while a run goes on; this crate is optimised for it.
+//! Numbers of tables and fields as text. A run writes millions of them.
 
 /// Significant digits: reading them back gives the same bits.
 const DIGITS: usize = 17;

@@ -2,7 +2,7 @@
 //!
 //! A [`Source`] is a text with the files that it came from. The function [`parse`] turns it into
 //! values or an [`InputError`] with file, line, key and what was expected. With [`base`] files build
-//! on each other. Nothing here knows what the keys mean.
+//! on each other. Nothing here knows what the keys mean. [`digits`] writes the numbers of results.
 
 pub mod base;
 pub mod digits;

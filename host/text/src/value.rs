@@ -30,7 +30,7 @@ impl<'i> Value<'i> {
         Self { value, span }
     }
 
-    /// Without its place. Only this is compiled anew for every type that is read, so the work is in [`Self::plain`].
+    /// Hands the value to serde. The compiler repeats this for every type that is read; [`Self::plain`] exists once.
     fn visit<V: Visitor<'i>>(self, visitor: V) -> Result<V::Value, Misfit> {
         match self.plain(&visitor)? {
             Plain::Text(text) => visitor.visit_string(text),

@@ -1,9 +1,10 @@
 //! `cycles.csv`: what a pile does when its load goes up and down.
 
 use super::criteria::Curve;
-use crate::table::{comma_separated, number};
+use crate::table::comma_separated;
 use std::path::Path;
 use text::Error;
+use text::digits::number;
 use text::write::replace;
 
 /// Reversals smaller than this share of the largest load are none.

@@ -7,10 +7,10 @@ use crate::experiment::{csv, digits, page, write as put};
 use input::calibration::{Calibration, Scale, Variance};
 use minijinja::value::Serde;
 use minijinja::{Value as Template, context};
-use results::number;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
+use text::digits::number;
 
 /// Writes all files of a calibration.
 ///

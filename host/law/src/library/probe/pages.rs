@@ -100,7 +100,7 @@ struct Heap(Box<[std::cell::UnsafeCell<u64>]>);
 impl Heap {
     fn new(length: usize) -> Self {
         let words = Box::new_zeroed_slice(length.div_ceil(size_of::<u64>()));
-        // SAFETY: a word of zeros is a number.
+        // SAFETY: zero is a valid `u64`, and a cell has the layout of its value.
         Self(unsafe { words.assume_init() })
     }
 
