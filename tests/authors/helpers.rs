@@ -136,6 +136,41 @@ fn many_internal_variables_are_refused_or_carried() {
     }
 }
 
+/// What a law frees is not told as kept, though the allocator keeps blocks of many sizes for later.
+#[test]
+fn freed_blocks_of_many_sizes_are_no_leak() {
+    let Some(cc) = compiler("CC", "cc") else {
+        return;
+    };
+    let folder = TempDir::new().unwrap();
+    let text = std::fs::read_to_string(repository("tests/authors/many_states.c")).unwrap();
+    let blocks = "static size_t calls;
+    calls++;
+    void *volatile block[7];
+    for (size_t i = 0; i < 7; i++) { block[i] = malloc(16 * (calls / 30)); }
+    for (size_t i = 0; i < 7; i++) { free(block[i]); }
+    *out = malloc(sizeof **out);";
+    let changed = text.replace("*out = malloc(sizeof **out);", blocks);
+    assert_ne!(changed, text);
+    std::fs::write(folder.path().join("blocks.c"), changed).unwrap();
+    let mut command = Command::new(cc);
+    command.args([
+        "-std=c11",
+        "-shared",
+        "-fPIC",
+        "-fvisibility=hidden",
+        "-DPILUM_MAX_STATES=400",
+    ]);
+    command.arg("-I").arg(repository("abi/include"));
+    crate::compilers::run(
+        command
+            .current_dir(folder.path())
+            .args(["blocks.c", "-o", "blocks.so"]),
+    );
+    let only = ["check", "./blocks.so", "--only", "memory-is-freed"];
+    pilum(folder.path(), &only).prints("1 checks: 1 passed");
+}
+
 /// The same law in C++ does not compile.
 #[test]
 fn a_class_with_too_many_internal_variables_does_not_compile() {

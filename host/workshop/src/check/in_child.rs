@@ -17,6 +17,8 @@ use text::write::replace;
 
 /// Most memory of a check, in bytes.
 const MEMORY: u64 = 8 << 30;
+/// Without the cache of each thread: glibc counts what was freed into it as in use (`tcache` in its manual).
+const NO_CACHE: (&str, &str) = ("GLIBC_TUNABLES", "glibc.malloc.tcache_count=0");
 
 /// Outcome of a check.
 #[derive(Serialize, Deserialize)]
@@ -234,6 +236,7 @@ pub(super) fn ask(
     let time = Duration::from_secs_f64(arguments.time_limit);
     let outcome = child::run(&Work {
         folder: Some(folder.clone()),
+        variables: vec![NO_CACHE],
         memory: Some(MEMORY),
         ..Work::new(all.clone(), time)
     })
