@@ -6,8 +6,8 @@
 //!   (K + α K_e) δ = r,
 //!
 //! are smaller where the body is soft, and go on in one direction. They approach equilibrium linearly;
-//! [Anderson acceleration](Acceleration) makes that faster. Nothing is committed: laws see one increment from the last
-//! equilibrium.
+//! [Anderson acceleration](Acceleration) makes that faster, and so does a smaller α where corrections are even. Nothing
+//! is committed: laws see one increment from the last equilibrium.
 //!
 //! A regularised correction is smaller than the error, so its size alone accepts nothing. If the last corrections
 //! shrink by a factor ρ < 1 each, those to come add up to ρ/(1 − ρ) times the last one, and that is held against the
@@ -22,8 +22,10 @@ use crate::equilibrium::newton::{
 use crate::settings::Settings;
 use law::Operator;
 
-/// α.
-const SHARE: f64 = 0.1;
+/// Largest and least α. It starts from the largest, falls by a factor where corrections are even, and rises by it
+/// where the residual does.
+const SHARES: (f64, f64) = (0.1, 0.02);
+const FALL: f64 = 4.0;
 /// A whole Newton correction is taken if it leaves no more than this share of the residual.
 const HALF: f64 = 0.5;
 /// The first corrections of a step may leave more.
@@ -33,8 +35,13 @@ const PATIENCE: usize = 4;
 /// Another Newton correction is tried after this many regularised ones in a row that halved the residual.
 const HALVINGS: usize = 2;
 /// Corrections are even, as those of a constant speed, if the cosine between them and the ratio of their sizes are
-/// at least this, three times in a row.
-const EVEN: (f64, f64, usize) = (0.95, 0.8, 3);
+/// at least this.
+const EVEN: (f64, f64) = (0.93, 0.8);
+/// Even corrections in a row after which α falls, and after which moves are long.
+const SHARE_FALLS: usize = 2;
+const MOVES_ARE_LONG: usize = 3;
+/// The residual rises if it grows by more than this factor, and above the tolerance.
+const JUMP: f64 = 2.0;
 /// An accelerated correction is not taken if the cosine between it and the plain one is less than this.
 const ALONG: f64 = 0.3;
 /// Growth of a long move from one trial to the next; largest one, relative to the increment.
@@ -61,6 +68,8 @@ pub(super) struct Regularised {
     /// Elastic stiffness, in the matrix's pattern; without the domain.
     elastic: Vec<f64>,
     moves: Acceleration,
+    /// α.
+    share: f64,
     /// The last correction before acceleration, and the sizes of those since the last long move.
     last: Vec<f64>,
     sizes: Vec<f64>,
@@ -84,6 +93,7 @@ impl Regularised {
         Self {
             elastic: Vec::new(),
             moves: Acceleration::default(),
+            share: SHARES.0,
             last: Vec::new(),
             sizes: Vec::new(),
             even: 0,
@@ -203,7 +213,7 @@ impl Regularised {
         state: &State,
     ) -> Result<(Iteration, State), StepFailure> {
         newton.tangents_at(&state.increment, task)?;
-        let share = SHARE;
+        let share = self.share;
         // If even that matrix is singular.
         self.has_given_way = true;
         newton.factorise_regularised(&self.elastic, share)?;
@@ -215,24 +225,14 @@ impl Regularised {
         self.even = if is_even { self.even + 1 } else { 0 };
         self.last.clone_from(&plain);
         self.sizes.push(size);
-        let improved = self.moves.improve(plain);
-        let (correction, length, next) = if self.even >= EVEN.2 {
+        let (correction, length, next) = if self.even >= MOVES_ARE_LONG {
             self.moves = Acceleration::default();
             self.sizes.clear();
-            let correction = Correction::by(self.last.clone());
+            let correction = Correction::by(plain);
             let (length, next) = far_along(newton, control, state, &correction)?;
             (correction, length, next)
         } else {
-            let is_along = self.cosine(&improved) >= ALONG;
-            let chosen = if is_along {
-                improved
-            } else {
-                self.last.clone()
-            };
-            let correction = Correction::by(chosen);
-            let (length, next) = as_far_as_laws_go(newton, control, state, &correction)?;
-            self.moves.took(&correction.increment, length);
-            (correction, length, next)
+            self.accelerated(newton, control, state, plain)?
         };
         let taken = Iteration {
             viscosity: share,
@@ -245,8 +245,52 @@ impl Regularised {
             && !next.balance.away.contains(&true)
             && self.is_near(&taken, newton.settings.displacement_tolerance)
             && newton_leaves(newton, task, &next.increment)? <= HELD;
+        self.adapt_share(rises(newton.settings, state, &next) || length < 1.0);
         newton.kept.contraction = f64::INFINITY;
         Ok((taken, next))
+    }
+
+    /// A correction that acceleration has made of the plain one or, if the residual rises along it, the plain one; with
+    /// its length, and where it leads.
+    fn accelerated(
+        &mut self,
+        newton: &mut Newton<'_>,
+        control: &impl Control,
+        state: &State,
+        plain: Vec<f64>,
+    ) -> Result<(Correction, f64, State), StepFailure> {
+        let improved = self.moves.improve(plain.clone());
+        if self.cosine(&improved) >= ALONG {
+            let correction = Correction::by(improved);
+            let (length, next) = as_far_as_laws_go(newton, control, state, &correction)?;
+            if self.moves.is_empty() || !rises(newton.settings, state, &next) {
+                self.moves.took(&correction.increment, length);
+                return Ok((correction, length, next));
+            }
+            self.moves = Acceleration::default();
+            self.moves.improve(plain.clone());
+        }
+        let correction = Correction::by(plain);
+        let (length, next) = as_far_as_laws_go(newton, control, state, &correction)?;
+        self.moves.took(&correction.increment, length);
+        Ok((correction, length, next))
+    }
+
+    /// Chooses α for the next correction. What corrections with another one achieved says nothing of it.
+    fn adapt_share(&mut self, is_too_small: bool) {
+        let share = if is_too_small {
+            (self.share * FALL).min(SHARES.0)
+        } else if self.even >= SHARE_FALLS {
+            (self.share / FALL).max(SHARES.1)
+        } else {
+            return;
+        };
+        if share != self.share {
+            self.share = share;
+            self.moves = Acceleration::default();
+            self.sizes.clear();
+            self.even = 0;
+        }
     }
 
     /// Cosine of the angle between the last correction and this one; 0 without one.
@@ -289,6 +333,11 @@ pub(super) fn newton_leaves(
         Err(failure) if failure.is_singular() => Ok(f64::INFINITY),
         correction => Ok(newton.relative(&correction?, increment)),
     }
+}
+
+/// Whether a correction has made the residual rise, and above the tolerance.
+fn rises(settings: &Settings, from: &State, to: &State) -> bool {
+    to.balance.relative > JUMP * from.balance.relative.max(settings.force_tolerance)
 }
 
 /// Least residual of iterations.

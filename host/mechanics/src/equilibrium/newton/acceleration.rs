@@ -42,6 +42,11 @@ impl Acceleration {
         }
     }
 
+    /// Whether there are no moves to learn from.
+    pub(in crate::equilibrium) fn is_empty(&self) -> bool {
+        self.moves.is_empty()
+    }
+
     /// Where the iterations with the present matrix start.
     pub(in crate::equilibrium) fn begins(&self) -> usize {
         self.since
