@@ -75,7 +75,7 @@ fn assert_equilibria(finished: &Finished) {
 
 #[test]
 fn relaxation_finds_the_next_equilibrium() {
-    let finished = run(&chamber(""));
+    let finished = run(&chamber("\n[solver]\nregularisation = false\n"));
     let loading = &finished.summary()["phases"][1];
     assert!(loading["relaxed_steps"].as_u64().unwrap() >= 1, "{loading}");
     assert_eq!(loading["cut_backs"], 0);
