@@ -249,7 +249,7 @@ fn run_point(asked: &Point, opener: Opener) -> Result<(), Error> {
                     driver.display()
                 )))
             }
-            None => runs::point::run_file_until(opener, driver, which, csv, stop, report),
+            None => runs::point::run_file(opener, driver, which, csv, stop, report),
         }
     })
 }

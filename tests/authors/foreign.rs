@@ -8,7 +8,6 @@ use crate::compilers::{library, repository};
 use crate::guides::commands;
 use crate::program::{pilum, shell};
 use abi::Hypothesis;
-use input::Driver;
 use law::{End, Law, Operator, SearchPath, Start, Strided};
 use std::fmt::Write as _;
 use std::fs;
@@ -16,7 +15,6 @@ use std::path::Path;
 use tempfile::TempDir;
 use tests::needs::compiler;
 use tests::tolerance::ROUND_OFF;
-use text::Source;
 
 /// Suffix of the source, id of the law.
 const LAWS: [(&str, &str); 3] = [
@@ -102,9 +100,9 @@ fn driver(random: &mut Random, folder: &Path) -> String {
 
 /// The table of a driver: names, rows. It may end early, without equilibrium.
 fn table(text: &str, law: &str) -> (Vec<String>, Vec<Vec<f64>>) {
-    let source = Source::new("driver.toml", text.replace("@LAW@", law));
+    let text = text.replace("@LAW@", law);
     let mut out = Vec::new();
-    let driver = Driver::from_source(&source).unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let driver = tests::driver::of_text(&text).unwrap_or_else(|error| panic!("{error}\n{text}"));
     let _ = runs::point::write_csv(&driver, &mut out, Path::new("table"));
     let out = String::from_utf8(out).unwrap();
     let mut lines = out.lines();

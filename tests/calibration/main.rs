@@ -19,14 +19,13 @@ mod stages;
 mod systematic;
 mod words;
 
+use input::Error;
 use input::calibration::Calibration;
-use input::{Driver, Error};
 use runs::calibration::{Options, Outcome, calibrate};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
-use text::Source;
 
 /// Carries out a calibration file in memory.
 fn run(file: &Path, settings: &[&str]) -> Result<Outcome, Error> {
@@ -56,7 +55,7 @@ fn run_in(
 
 /// Two columns that a driver computes, at places along the first.
 fn computed(driver: &str, columns: [&str; 2], at: &[f64]) -> Vec<f64> {
-    let driver = Driver::from_source(&Source::new("driver.toml", driver)).unwrap();
+    let driver = tests::driver::of_text(driver).unwrap();
     let names = results::point_figure::drawable(driver.point());
     let [x, y] = columns.map(|name| names.iter().position(|other| other == name).unwrap());
     let mut line = Vec::new();

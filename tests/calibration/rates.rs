@@ -230,7 +230,7 @@ fn rates_follow_through_segments_of_led_flux() {
 /// Points between the ends of a segment.
 fn part(values: [f64; 4], segment: usize, columns: [&str; 2]) -> Vec<(f64, f64)> {
     let text = driver(values);
-    let driver = input::Driver::from_source(&text::Source::new("driver.toml", text)).unwrap();
+    let driver = tests::driver::of_text(&text).unwrap();
     let names = results::point_figure::drawable(driver.point());
     let [x, y] = columns.map(|name| names.iter().position(|other| other == name).unwrap());
     let mut rows = Vec::new();

@@ -5,8 +5,8 @@
 //! Asserts   ultimate shear stress, monotony, plateaus; the zero-thickness element against a closed
 //!           form; the layer with mean strains against the law at one point; the causes one by one.
 
+use input::Case;
 use input::case::CaseFile;
-use input::{Case, Driver};
 use mechanics::problem::Integration;
 use runs::run::run;
 use std::path::Path;
@@ -14,7 +14,6 @@ use tempfile::TempDir;
 use tests::case::{Silent, column};
 use tests::tolerance::close;
 use tests::tolerance::{EQUILIBRIUM, near};
-use text::Source;
 
 /// Aspect ratios L/t; L = 10 mm.
 const RATIOS: [u32; 9] = [1, 5, 10, 25, 50, 100, 1000, 10_000, 1_000_000];
@@ -212,7 +211,7 @@ control = {{ t = {{ jump = 1e-3 }}, n = {{ jump = 0.0 }} }}
 "#,
         0.01 / f64::from(ratio)
     );
-    let driver = Driver::from_source(&Source::new("driver.toml", text)).unwrap();
+    let driver = tests::driver::of_text(&text).unwrap();
     let mut rows = Vec::new();
     driver
         .run(|row| {

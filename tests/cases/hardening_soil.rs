@@ -6,7 +6,6 @@
 
 use crate::variant::{Run, assert_close, finished};
 use input::Case;
-use runs::point::run_file_variants;
 use tempfile::TempDir;
 use tests::case::column;
 use tests::place::case;
@@ -18,7 +17,7 @@ fn axial(driver: &str, variant: Option<&str>) -> [Vec<f64>; 2] {
     let folder = TempDir::new().unwrap();
     let csv = folder.path().join("rows.csv");
     let driver = case("hardening_soil_tests").join(driver);
-    run_file_variants(&driver, variant, Some(&csv), |_| ()).unwrap();
+    tests::driver::run(&driver, variant, Some(&csv), |_| ()).unwrap();
     ["strain_22", "stress_22"].map(|name| column(&csv, name))
 }
 

@@ -5,7 +5,6 @@
 //! Asserts   closed forms at the turns of each path; balance of the loads on the chamber and on the
 //!           pile, what is known of the shaft at the end.
 
-use runs::point::run_file_variants;
 use std::f64::consts::PI;
 use std::path::Path;
 use tempfile::TempDir;
@@ -20,7 +19,7 @@ fn columns<const N: usize>(driver: &str, variant: &str, names: [&str; N]) -> [Ve
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../cases/joint_laws");
     let folder = TempDir::new().unwrap();
     let csv = folder.path().join("rows.csv");
-    run_file_variants(&path.join(driver), Some(variant), Some(&csv), |report| {
+    tests::driver::run(&path.join(driver), Some(variant), Some(&csv), |report| {
         assert_eq!(report.warnings, Vec::<String>::new());
     })
     .unwrap();

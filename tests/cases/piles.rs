@@ -5,7 +5,6 @@
 //! Asserts   measured points; the α and β methods; Mindlin's solution; balance of the pile.
 
 use crate::variant::{Run, assert_close, finished};
-use runs::point::run_file_variants;
 use std::f64::consts::PI;
 use tempfile::TempDir;
 use tests::case::column;
@@ -46,7 +45,7 @@ fn misfit(variant: &str) -> [f64; 2] {
     let folder = TempDir::new().unwrap();
     let csv = folder.path().join("rows.csv");
     let driver = case("measured_interface_praai/driver.toml");
-    run_file_variants(&driver, Some(variant), Some(&csv), |_| ()).unwrap();
+    tests::driver::run(&driver, Some(variant), Some(&csv), |_| ()).unwrap();
     let slip = column(&csv, "jump_t");
     let file = case("measured_interface_praai/final_shear.csv");
     let at = column(&file, "slip (mm)");
@@ -81,7 +80,7 @@ fn misfit_of_cycles(variant: &str) -> [f64; 2] {
     let folder = TempDir::new().unwrap();
     let csv = folder.path().join("rows.csv");
     let driver = case("measured_interface_praai/state.toml");
-    run_file_variants(&driver, Some(variant), Some(&csv), |_| ()).unwrap();
+    tests::driver::run(&driver, Some(variant), Some(&csv), |_| ()).unwrap();
     let cycles = column(&csv, "time");
     let file = case("measured_interface_praai/cycle_means.csv");
     let at = column(&file, "cycle");

@@ -6,7 +6,6 @@
 //!           order of curves; normal stress against the stiffness that holds it; figures.
 
 use input::Error;
-use runs::point::run_file_variants;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 use tests::case::column;
@@ -29,7 +28,7 @@ impl Tests {
         let folder = TempDir::new().unwrap();
         let csv = folder.path().join("test.csv");
         let mut variants = 0;
-        run_file_variants(&driver(name), None, Some(&csv), |report| {
+        tests::driver::run(&driver(name), None, Some(&csv), |report| {
             assert_eq!(report.warnings, Vec::<String>::new());
             variants += 1;
         })
@@ -316,7 +315,7 @@ fn with_a_reference_pressure_of_100_kpa_there_is_hardly_any_contraction() {
     .unwrap();
     let csv = folder.path().join("test.csv");
     let mut reference = f64::NAN;
-    run_file_variants(&file, Some("100_kPa"), Some(&csv), |report| {
+    tests::driver::run(&file, Some("100_kPa"), Some(&csv), |report| {
         let contraction = report.last.iter().find(|(name, _)| name == "jump_n");
         reference = contraction.unwrap().1;
     })
@@ -340,11 +339,11 @@ fn figures_stand_beside_the_table() {
 fn a_driver_with_variants_needs_a_file_or_the_name_of_one() {
     let no_report = |_: &runs::point::PointReport| panic!("nothing should have run");
     let file = driver("silica.toml");
-    let error = run_file_variants(&file, None, None, no_report).unwrap_err();
+    let error = tests::driver::run(&file, None, None, no_report).unwrap_err();
     assert!(matches!(error, Error::Text(text::Error::Usage(_))));
     let words = error.to_string();
     assert!(words.contains("--csv") && words.contains("--variant") && words.contains("test_2"));
-    let error = run_file_variants(&file, Some("test_4"), None, no_report).unwrap_err();
+    let error = tests::driver::run(&file, Some("test_4"), None, no_report).unwrap_err();
     assert!(error.to_string().contains("`test_4`: did you mean `test_"));
 }
 
@@ -362,7 +361,7 @@ name = "silica_mu" | name = "a/b" | cannot be a file's name
 "#,
     ) {
         std::fs::write(&file, text.replace(from, to)).unwrap();
-        let error = run_file_variants(&file, None, Some(&csv), |_| {}).unwrap_err();
+        let error = tests::driver::run(&file, None, Some(&csv), |_| {}).unwrap_err();
         assert!(matches!(error, Error::Text(text::Error::Input(_))));
         assert!(error.to_string().contains(words), "{error}");
     }

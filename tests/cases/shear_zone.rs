@@ -5,7 +5,6 @@
 //! Asserts   elastic stage τ = G u_t/d up to the yield that the lateral stress gives; limits of
 //!           Mohr–Coulomb in simple shear; the oriented criterion; critical state of hypoplasticity.
 
-use runs::point::run_file_variants;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use tempfile::TempDir;
@@ -27,7 +26,7 @@ impl Tests {
     fn run(driver: &Path) -> Self {
         let folder = TempDir::new().unwrap();
         let csv = folder.path().join("test.csv");
-        run_file_variants(driver, None, Some(&csv), |report| {
+        tests::driver::run(driver, None, Some(&csv), |report| {
             // Sand that dilates by its angle of friction is for the sake of the closed form.
             let unusual = "dilatancy_angle = 35 deg is outside its usual range";
             let mut warnings = report.warnings.iter();

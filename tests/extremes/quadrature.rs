@@ -22,8 +22,7 @@ use crate::mepi_paths::{FONTAINEBLEAU, SILICA, TABLE_4, extremes};
 use crate::mepi_step::{Constants, Mepi};
 use crate::point::{Point, law, reason};
 use abi::Hypothesis;
-use input::{Driver, Error};
-use text::Source;
+use input::Error;
 
 /// ξ, σ_n, τ at a slip.
 pub(crate) type Shear = [f64; 3];
@@ -176,7 +175,7 @@ fn drive(
         -sigma
     );
     let refused = |why: Error| Verdict::Refused(why.to_string());
-    let mut driver = Driver::from_source(&Source::new("driver.toml", text)).map_err(refused)?;
+    let mut driver = tests::driver::of_text(&text).map_err(refused)?;
     let mut ends = [[0.0; 3]; 2];
     for (end, n) in ends.iter_mut().zip(increments) {
         driver.point_mut().set_increments(&[n]);

@@ -9,7 +9,6 @@
 
 use input::{Case, Kind};
 use results::Figures;
-use runs::point::run_file_variants;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
@@ -125,7 +124,7 @@ fn draw(input: &str) -> TempDir {
         return place;
     }
     if input::is_driver(&path).unwrap() {
-        run_file_variants(&path, None, Some(&place.path().join("rows.csv")), |_| ()).unwrap();
+        tests::driver::run(&path, None, Some(&place.path().join("rows.csv")), |_| ()).unwrap();
         return place;
     }
     let mut drawn = Vec::new();

@@ -2,14 +2,12 @@
 //! machine has, and those inside OpenGeoSys.
 
 use crate::{BondedPile, OPENGEOSYS, assert_close, installed, is_there, library};
-use input::Driver;
 use law::foreign::{Adapter, Foreign};
 use law::{Bounds, Opener};
 use runs::point::PointReport;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use text::Source;
 
 /// The library with behaviours that comes with OpenGeoSys.
 fn behaviours() -> PathBuf {
@@ -31,7 +29,7 @@ fn last_row(text: &str) -> BTreeMap<String, f64> {
 
 /// All rows of a driver, by column, and what it reports.
 pub(crate) fn rows(text: &str) -> (Vec<BTreeMap<String, f64>>, PointReport) {
-    let driver = Driver::from_source(&Source::new("driver.toml", text)).unwrap();
+    let driver = tests::driver::of_text(text).unwrap();
     let mut out = Vec::new();
     let report = runs::point::write_csv(&driver, &mut out, Path::new("table")).unwrap();
     let table = String::from_utf8(out).unwrap();

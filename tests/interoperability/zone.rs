@@ -3,14 +3,12 @@
 
 use crate::mfront::{driver, rows};
 use crate::{assert_close, beside, last_line};
-use input::Driver;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::Command;
 use std::sync::LazyLock;
 use tempfile::TempDir;
 use tests::needs::compiler;
-use text::Source;
 
 /// The library, compiled once.
 static ZONE: LazyLock<(TempDir, PathBuf)> = LazyLock::new(|| {
@@ -165,7 +163,7 @@ fn it_is_given_the_time_of_its_increments() {
             &[(4, "n = { jump = 4e-5 }")],
         );
         let text = text.replacen("increments = 4\n", &format!("increments = 4\n{time}"), 1);
-        let driver = Driver::from_source(&Source::new("driver.toml", text)).unwrap();
+        let driver = tests::driver::of_text(&text).unwrap();
         let outcome = runs::point::write_csv(&driver, Vec::new(), std::path::Path::new("table"));
         let message = format!("{}", outcome.unwrap_err())
             .split_whitespace()
@@ -200,7 +198,7 @@ fn its_bounds_are_kept() {
     }
     let path: &[(usize, &str)] = &[(1, "n = { jump = 1e-6 }")];
     let text = zone("", path).replacen("NormalStiffness = 10000000.0", "NormalStiffness = -1.0", 1);
-    let error = Driver::from_source(&Source::new("driver.toml", text)).unwrap_err();
+    let error = tests::driver::of_text(&text).unwrap_err();
     assert!(error.to_string().contains("NormalStiffness"), "{error}");
     let text = zone("", path).replacen("Stiffness = 4000000.0", "Stiffness = 2e9", 1);
     let (_, report) = rows(&text);

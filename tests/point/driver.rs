@@ -1,9 +1,8 @@
 //! Running a driver given as a text, and reading its rows by column.
 
-use input::{Driver, Error};
+use input::Error;
 use runs::point::PointReport;
 use std::path::Path;
-use text::Source;
 
 /// MEPI of Table IV (1) of De Gennaro & Frank, with the p_0 that makes it dilate.
 pub(crate) const MEPI: &str = "[parameters]\nk_n = 0.86e5\nk_t = 0.37e5\nn = 0.55\n\
@@ -20,7 +19,7 @@ pub(crate) struct Run {
 /// The table that a driver writes, and how it ended.
 pub(crate) fn csv(text: &str) -> (String, Result<PointReport, Error>) {
     let mut out = Vec::new();
-    let result = Driver::from_source(&Source::new("driver.toml", text))
+    let result = tests::driver::of_text(text)
         .and_then(|driver| runs::point::write_csv(&driver, &mut out, Path::new("table")));
     (String::from_utf8(out).unwrap(), result)
 }

@@ -6,8 +6,7 @@
 //! Asserts     exit code, key facts of the message, the underlined text.
 
 use crate::driver::{MEPI, attempt};
-use input::{Driver, Error};
-use text::Source;
+use input::Error;
 
 const SOLID: &str = "law = 'elastic'\nhypothesis = 'plane_strain'\n[parameters]\n\
     young_modulus = 1e5\npoisson_ratio = 0.25\n";
@@ -18,7 +17,7 @@ const SEGMENT: &str = "[[segment]]\nincrements = 1\ncontrol = {}\n";
 
 /// The driver is refused; its message and hint hold these parts.
 fn refuses(text: &str, parts: &[&str]) {
-    let error = Driver::from_source(&Source::new("driver.toml", text)).unwrap_err();
+    let error = tests::driver::of_text(text).unwrap_err();
     assert_eq!(error.exit_code(), 1, "{error}\n{text}");
     assert!(
         matches!(error, Error::Text(text::Error::Input(_))),
@@ -241,7 +240,7 @@ fn initial_states_that_the_law_refuses() {
 #[test]
 fn laws_that_are_not_there() {
     let text = format!("{SOLID}{SEGMENT}").replace("'elastic'", "'elastik'");
-    let error = Driver::from_source(&Source::new("driver.toml", text.as_str())).unwrap_err();
+    let error = tests::driver::of_text(&text).unwrap_err();
     assert_eq!(error.exit_code(), 3);
     let all = format!("{error:?}");
     assert!(
@@ -253,9 +252,7 @@ fn laws_that_are_not_there() {
 #[test]
 fn messages_point_to_the_place() {
     let text = solid("22 = { jump = 77 }");
-    let Error::Text(text::Error::Input(error)) =
-        Driver::from_source(&Source::new("driver.toml", text.as_str())).unwrap_err()
-    else {
+    let Error::Text(text::Error::Input(error)) = tests::driver::of_text(&text).unwrap_err() else {
         panic!("an input error");
     };
     assert_eq!(error.span().start, text.find("77").unwrap());

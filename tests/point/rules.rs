@@ -7,8 +7,9 @@
 
 use crate::driver::{MEPI, attempt, csv, follow};
 use approx::assert_relative_eq;
-use runs::point::run_file;
+use runs::point::PointReport;
 use std::fs;
+use std::path::Path;
 use std::path::PathBuf;
 
 const ELASTIC: &str = "[parameters]\nyoung_modulus = 1e5\npoisson_ratio = 0.25\n";
@@ -279,6 +280,13 @@ fn one_row_per_increment_however_many_steps() {
     assert_relative_eq!(run.last("traction_t"), 50.0, max_relative = 1e-9);
 }
 
+/// Runs a driver file without variants.
+fn run_file(path: &Path, csv: &Path) -> Result<PointReport, runs::Error> {
+    let mut reports = Vec::new();
+    tests::driver::run(path, None, Some(csv), |report| reports.push(report.clone()))?;
+    Ok(reports.remove(0))
+}
+
 #[test]
 fn rows_reach_the_file_also_when_the_path_ends_early() {
     let folder = folder("rows");
@@ -288,7 +296,7 @@ fn rows_reach_the_file_also_when_the_path_ends_early() {
          control = {{ t = {{ traction = 100 }} }}"
     );
     fs::write(&driver, path).unwrap();
-    assert_eq!(run_file(&driver, Some(&table)).unwrap_err().exit_code(), 2);
+    assert_eq!(run_file(&driver, &table).unwrap_err().exit_code(), 2);
     let rows = fs::read_to_string(&table).unwrap();
     assert_eq!(rows.lines().count(), 2 + 75);
     assert!(rows.ends_with('\n'));
@@ -304,7 +312,7 @@ fn the_report_says_what_was_run() {
          control = {{ 22 = {{ stress = -100 }} }}"
     );
     fs::write(&driver, path).unwrap();
-    let report = run_file(&driver, Some(&table)).unwrap();
+    let report = run_file(&driver, &table).unwrap();
     assert_eq!((report.law.as_str(), report.increments), ("elastic", 3));
     let text = report.to_string();
     for part in [
@@ -325,7 +333,7 @@ fn bad_input_leaves_an_existing_table_alone() {
     let (driver, table) = (folder.join("driver.toml"), folder.join("rows.csv"));
     fs::write(&driver, "law = 'elastic'\n").unwrap();
     fs::write(&table, "kept").unwrap();
-    assert_eq!(run_file(&driver, Some(&table)).unwrap_err().exit_code(), 1);
+    assert_eq!(run_file(&driver, &table).unwrap_err().exit_code(), 1);
     assert_eq!(fs::read_to_string(&table).unwrap(), "kept");
     fs::remove_dir_all(folder).unwrap();
 }
@@ -339,10 +347,10 @@ fn the_driver_file_is_not_overwritten() {
     );
     fs::write(&driver, &text).unwrap();
     let same = folder.join(".").join("driver.toml");
-    assert_eq!(run_file(&driver, Some(&same)).unwrap_err().exit_code(), 1);
+    assert_eq!(run_file(&driver, &same).unwrap_err().exit_code(), 1);
     assert_eq!(fs::read_to_string(&driver).unwrap(), text);
     let nowhere = folder.join("no_such_folder").join("rows.csv");
-    let error = run_file(&driver, Some(&nowhere)).unwrap_err();
+    let error = run_file(&driver, &nowhere).unwrap_err();
     assert!(error.to_string().contains("cannot write"), "{error}");
     fs::remove_dir_all(folder).unwrap();
 }
@@ -359,10 +367,10 @@ fn law_path_is_relative_to_the_driver_file() {
     };
     fs::write(&driver, text("")).unwrap();
     let table = folder.join("rows.csv");
-    let library = run_file(&driver, Some(&table)).unwrap().library;
+    let library = run_file(&driver, &table).unwrap().library;
     let copy = folder.join("laws").join(library.file_name().unwrap());
     fs::copy(&library, &copy).unwrap();
     fs::write(&driver, text("law_path = ['laws']\n")).unwrap();
-    assert_eq!(run_file(&driver, Some(&table)).unwrap().library, copy);
+    assert_eq!(run_file(&driver, &table).unwrap().library, copy);
     fs::remove_dir_all(folder).unwrap();
 }

@@ -3,11 +3,9 @@
 mod laws;
 
 use crate::seeds::{End, hold};
-use input::Driver;
 use laws::{Law, law};
 use proptest::prelude::*;
 use std::fmt::Write as _;
-use text::Source;
 
 /// How a component is led through a segment.
 #[derive(Clone, Copy, Debug)]
@@ -152,8 +150,7 @@ impl Path {
     /// Rows of gradients and fluxes, as seen plainly in kPa, and how it ended.
     fn run(&self, view: View) -> Result<Outcome, String> {
         let text = self.text(view);
-        let source = Source::new("driver.toml", text);
-        let driver = Driver::from_source(&source).map_err(|error| format!("refused: {error}"))?;
+        let driver = tests::driver::of_text(&text).map_err(|error| format!("refused: {error}"))?;
         let n = self.components().len();
         let mut rows = Vec::new();
         let result = driver.run(|row| {

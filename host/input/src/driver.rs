@@ -186,65 +186,29 @@ pub struct Driver {
 }
 
 impl Driver {
-    /// Reads a driver file and builds its law: one driver, or one for each `[[variant]]`.
+    /// Reads a driver file and builds its law: one driver, or one for each `[[variant]]`. Settings,
+    /// `KEY=VALUE`, go over what the file says, in every variant; the law's library is opened with this
+    /// opener.
     ///
     /// # Errors
-    /// The file cannot be read, and those of [`Driver::from_source`].
-    pub fn read(path: &Path) -> Result<Vec<Self>, Error> {
-        Self::read_with(&Opener::default(), path, &[])
+    /// The file cannot be read, and those of [`Driver::variants`]; at the place in a setting.
+    pub fn read(opener: &Opener, path: &Path, settings: &[String]) -> Result<Vec<Self>, Error> {
+        Self::variants(opener, Source::read(path)?.with_settings(settings), true)
     }
 
-    /// As [`Driver::read`], with settings over what the file says, `KEY=VALUE`, in every variant; the
-    /// law's library is opened with this.
-    ///
-    /// # Errors
-    /// As [`Driver::read`]; at the place in a setting.
-    pub fn read_with(
-        opener: &Opener,
-        path: &Path,
-        settings: &[String],
-    ) -> Result<Vec<Self>, Error> {
-        Self::variants_with(opener, Source::read(path)?.with_settings(settings), true)
-    }
-
-    /// As [`Driver::read_with`], whatever the lock next to the file says.
+    /// As [`Driver::read`] without settings, whatever the lock next to the file says.
     ///
     /// # Errors
     /// As [`Driver::read`].
     pub fn read_unlocked(opener: &Opener, path: &Path) -> Result<Vec<Self>, Error> {
-        Self::variants_with(opener, Source::read(path)?, false)
-    }
-
-    /// Takes the text of a driver file without variants and builds its law.
-    ///
-    /// # Errors
-    /// At the place that does not fit; the law is not found or its library is defective; the file has
-    /// variants.
-    pub fn from_source(source: &Source) -> Result<Self, Error> {
-        let mut drivers = Self::variants(source.clone(), true)?;
-        match (drivers.pop(), drivers.is_empty()) {
-            (Some(driver), true) => Ok(driver),
-            _ => Err(text::Error::Usage("the driver has several variants".to_owned()).into()),
-        }
+        Self::variants(opener, Source::read(path)?, false)
     }
 
     /// Takes the text of a driver file. `locked`: the lock next to it is honoured.
     ///
     /// # Errors
-    /// As [`Driver::read`].
-    pub fn variants(source: Source, locked: bool) -> Result<Vec<Self>, Error> {
-        Self::variants_with(&Opener::default(), source, locked)
-    }
-
-    /// The same; the law's library is opened with this.
-    ///
-    /// # Errors
-    /// As [`Driver::read`].
-    pub fn variants_with(
-        opener: &Opener,
-        source: Source,
-        locked: bool,
-    ) -> Result<Vec<Self>, Error> {
+    /// At the place that does not fit; the law is not found or its library is defective.
+    pub fn variants(opener: &Opener, source: Source, locked: bool) -> Result<Vec<Self>, Error> {
         let (source, files) = read_kind(source, &CASE)?;
         let driver = |(variant, file)| {
             let load = |file: &DriverFile| Self::load(opener, &source, file, locked);

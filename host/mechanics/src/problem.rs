@@ -117,15 +117,6 @@ impl Material {
             varying: Vec::new(),
         }
     }
-
-    /// With another initial value of an internal variable; `None` if the law has no such variable.
-    #[must_use]
-    pub fn starting_with(mut self, id: &str, value: f64) -> Option<Self> {
-        let variables = &self.built.law.formulation().internal_variables;
-        let number = variables.iter().position(|variable| variable.id == id)?;
-        self.initial.push((number, value));
-        Some(self)
-    }
 }
 
 /// A group of elements.

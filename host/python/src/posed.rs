@@ -125,7 +125,7 @@ impl Posed {
     /// # Errors
     /// As [`Driver::read`]; there is no such variant.
     pub(crate) fn drivers(&self) -> Result<Vec<Driver>, Error> {
-        let mut drivers = Driver::variants_with(&self.opener, self.source()?, true)?;
+        let mut drivers = Driver::variants(&self.opener, self.source()?, true)?;
         let name = |driver: &Driver| driver.point().variant().map(str::to_owned);
         keep(&mut drivers, self.variant.as_deref(), name)?;
         Ok(drivers)

@@ -96,47 +96,16 @@ impl fmt::Display for PointReport {
     }
 }
 
-/// Runs a driver file without variants. Rows go to `csv`, or to the standard output.
-///
-/// # Errors
-/// As [`run_file_variants`].
-pub fn run_file(path: &Path, csv: Option<&Path>) -> Result<PointReport, Error> {
-    let mut last = None;
-    run_file_variants(path, None, csv, |report| last = Some(report.clone()))?;
-    last.ok_or_else(|| Error::internal("a driver file without drivers"))
-}
-
 /// Runs a driver file: all its variants one after the other, or one of them. Rows go to `csv`, or
 /// to the standard output; of several variants to `csv` with `_<variant>` before its ending.
-/// Figures are next to `csv`, each with the curves of all variants.
+/// Figures are next to `csv`, each with the curves of all variants. Settings, `KEY=VALUE`, go over what
+/// the file says.
 ///
 /// # Errors
 /// Bad input and trouble with libraries, before anything is written; what cannot be written; a
-/// driver that does not come to its end, after the rows and curves found until then have been
-/// written.
-pub fn run_file_variants(
-    path: &Path,
-    variant: Option<&str>,
-    csv: Option<&Path>,
-    report: impl FnMut(&PointReport),
-) -> Result<(), Error> {
-    run_file_until(
-        &Opener::default(),
-        path,
-        (variant, &[]),
-        csv,
-        &Stop::never(),
-        report,
-    )
-}
-
-/// As [`run_file_variants`], to be stopped on its way, and with settings over what the file says,
-/// `KEY=VALUE`.
-///
-/// # Errors
-/// As [`run_file_variants`]; also that it was stopped, after the rows found until then have been
-/// written.
-pub fn run_file_until(
+/// driver that does not come to its end or is stopped, after the rows and curves found until then
+/// have been written.
+pub fn run_file(
     opener: &Opener,
     path: &Path,
     (variant, settings): (Option<&str>, &[String]),
@@ -144,7 +113,7 @@ pub fn run_file_until(
     stop: &Stop,
     mut report: impl FnMut(&PointReport),
 ) -> Result<(), Error> {
-    let mut drivers = Driver::read_with(opener, path, settings)?;
+    let mut drivers = Driver::read(opener, path, settings)?;
     for driver in &mut drivers {
         driver.point_mut().stop_on(stop);
     }
@@ -155,7 +124,7 @@ pub fn run_file_until(
 /// standard output.
 ///
 /// # Errors
-/// As [`run_file_until`].
+/// As [`run_file`].
 pub fn run_incremental(
     opener: &Opener,
     path: &Path,
@@ -326,7 +295,7 @@ impl Write for Guarded {
 /// capsule is written next to it if it is a file.
 ///
 /// # Errors
-/// As [`run_file_until`]; the rows found until then have been written.
+/// As [`run_file`]; the rows found until then have been written.
 pub fn write_csv(driver: &Driver, out: impl Write, name: &Path) -> Result<PointReport, Error> {
     follow(driver, out, &mut empty_figures(driver)).map_err(|ended| ended.at(driver, name))
 }

@@ -95,7 +95,7 @@ fn run_drivers(
     show: &mut dyn FnMut(&str),
     say: &mut dyn FnMut(&str),
 ) -> Result<(), Error> {
-    let mut drivers = Driver::read_with(&options.opener, path, &options.settings)?;
+    let mut drivers = Driver::read(&options.opener, path, &options.settings)?;
     let stop = &options.stop;
     for driver in &mut drivers {
         driver.point_mut().stop_on(stop);

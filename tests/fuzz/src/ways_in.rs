@@ -4,7 +4,7 @@ use input::case::PartInput;
 use input::{Case, Driver, Error};
 use law::capsule::{Capsule, LibraryCapsule};
 use law::inspect::{Inspection, inspect_bytes};
-use law::{LawDescription, Pins, SearchPath, foreign};
+use law::{LawDescription, Opener, Pins, SearchPath, foreign};
 use mechanics::Mesh;
 use std::path::Path;
 use text::Source;
@@ -55,7 +55,7 @@ pub(crate) fn mesh_file(bytes: &[u8]) -> Result<Mesh, String> {
 /// # Errors
 /// Those of [`Driver::read`].
 pub(crate) fn drivers(source: Source) -> Result<Vec<Driver>, Error> {
-    Driver::variants(source, false)
+    Driver::variants(&Opener::default(), source, false)
 }
 
 /// Input of the IncrementalDriver: number of increments of its test; material and initial state

@@ -238,7 +238,7 @@ fn subject(
     };
     if let Some(written) = &input.driver {
         let path = existing(written, Path::is_file)?;
-        let drivers = Driver::read_with(opener, &path, &[])?;
+        let drivers = Driver::read(opener, &path, &[])?;
         let name = |driver: &Driver| driver.point().variant().map(str::to_owned);
         let driver = the_one(calibration, input, &path, drivers, name)?;
         let known = Known {

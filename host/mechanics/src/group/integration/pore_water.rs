@@ -85,11 +85,6 @@ impl Group {
         Ok(Ok(()))
     }
 
-    /// Whether pore water follows the deformation, or did.
-    pub fn has_excess(&self) -> bool {
-        self.pores.is_some()
-    }
-
     /// Excess pore pressure of a point (committed), kPa.
     pub fn excess_pore_pressure(&self, point: usize) -> f64 {
         let pores = self.pores.as_ref();
