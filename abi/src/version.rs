@@ -236,51 +236,21 @@ mod tests {
         );
     }
 
+    fn block_with(edit: fn(&mut MagicBlock)) -> MagicBlock {
+        let mut block = MAGIC_BLOCK;
+        edit(&mut block);
+        block
+    }
+
     #[test]
     fn names_the_differing_field() {
         let cases = [
-            (
-                MagicBlock {
-                    magic: 1,
-                    ..MAGIC_BLOCK
-                },
-                "magic",
-            ),
-            (
-                MagicBlock {
-                    struct_size: 16,
-                    ..MAGIC_BLOCK
-                },
-                "struct_size",
-            ),
-            (
-                MagicBlock {
-                    pointer_bytes: 4,
-                    ..MAGIC_BLOCK
-                },
-                "pointer_bytes",
-            ),
-            (
-                MagicBlock {
-                    real_bytes: 4,
-                    ..MAGIC_BLOCK
-                },
-                "real_bytes",
-            ),
-            (
-                MagicBlock {
-                    abi_major: 2,
-                    ..MAGIC_BLOCK
-                },
-                "abi_major",
-            ),
-            (
-                MagicBlock {
-                    layout_hash: 0,
-                    ..MAGIC_BLOCK
-                },
-                "layout_hash",
-            ),
+            (block_with(|block| block.magic = 1), "magic"),
+            (block_with(|block| block.struct_size = 16), "struct_size"),
+            (block_with(|block| block.pointer_bytes = 4), "pointer_bytes"),
+            (block_with(|block| block.real_bytes = 4), "real_bytes"),
+            (block_with(|block| block.abi_major = 2), "abi_major"),
+            (block_with(|block| block.layout_hash = 0), "layout_hash"),
         ];
         for (block, field) in cases {
             assert_eq!(check(&block).unwrap_err().field, field);

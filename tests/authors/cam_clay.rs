@@ -105,10 +105,7 @@ fn undrained(size: f64) -> [f64; 6] {
 }
 
 fn close(found: f64, expected: f64, tolerance: f64, what: &str) {
-    assert!(
-        (found - expected).abs() <= tolerance * expected.abs(),
-        "{what}: {found}, expected {expected}"
-    );
+    tests::tolerance::close(what, found, expected, tolerance * expected.abs());
 }
 
 /// Fluxes and states to round-off, through two hundred increments that add it up; tangents to that

@@ -4,38 +4,13 @@
 use crate::compilers::repository;
 use std::fs;
 use std::path::{Path, PathBuf};
+use tests::words::words;
 
 /// Methods that look into a text.
-const LOOKS: [&str; 8] = [
-    "contains",
-    "starts_with",
-    "ends_with",
-    "strip_prefix",
-    "strip_suffix",
-    "split_once",
-    "find",
-    "eq",
-];
+const LOOKS: &str = "contains starts_with ends_with strip_prefix strip_suffix split_once find eq";
 
 /// Names of messages, as variables, fields and methods have them.
-const MESSAGES: [&str; 16] = [
-    "description",
-    "error",
-    "help",
-    "hint",
-    "message",
-    "reason",
-    "refusal",
-    "said",
-    "says",
-    "sentence",
-    "stderr",
-    "warning",
-    "warnings",
-    "what",
-    "why",
-    "words",
-];
+const MESSAGES: &str = "description error help hint message reason refusal said says sentence stderr warning warnings what why words";
 
 /// Files that may, with the reason.
 const ALLOWED: [(&str, &str); 1] = [(
@@ -77,12 +52,12 @@ fn chain(before: &str) -> impl Iterator<Item = &str> {
 fn decisions(code: &str) -> Vec<&str> {
     let mut found = Vec::new();
     let mut look = |at: usize| {
-        if chain(&code[..at]).any(|name| MESSAGES.contains(&name)) {
+        if chain(&code[..at]).any(|name| words(MESSAGES).contains(&name)) {
             let start = code[..at].rfind('\n').map_or(0, |end| end + 1);
             found.extend(code[start..].lines().next());
         }
     };
-    for method in LOOKS {
+    for method in words(LOOKS) {
         for (at, _) in code.match_indices(&format!(".{method}(\"")) {
             look(at);
         }

@@ -15,6 +15,7 @@ use std::path::Path;
 use tempfile::TempDir;
 use tests::needs::compiler;
 use tests::tolerance::ROUND_OFF;
+use tests::words::words;
 
 /// Suffix of the source, id of the law.
 const LAWS: [(&str, &str); 3] = [
@@ -60,14 +61,8 @@ fn random_angle(seed: u64) -> f64 {
     Random(seed).between(5.0, 40.0)
 }
 
-const NAMES: [&str; 6] = [
-    "normal_stiffness",
-    "shear_stiffness",
-    "cohesion",
-    "friction_angle",
-    "dilatancy_angle",
-    "tensile_strength",
-];
+const NAMES: &str =
+    "normal_stiffness shear_stiffness cohesion friction_angle dilatancy_angle tensile_strength";
 
 /// A driver whose law is `@LAW@`: sliding both ways, opening, closing, with and without a spring.
 fn driver(random: &mut Random, folder: &Path) -> String {
@@ -75,7 +70,7 @@ fn driver(random: &mut Random, folder: &Path) -> String {
         "law = '@LAW@'\nhypothesis = 'interface_2d'\nlaw_path = ['{}']\n[parameters]\n",
         folder.display()
     );
-    for (name, value) in NAMES.iter().zip(parameters(random)) {
+    for (name, value) in words(NAMES).iter().zip(parameters(random)) {
         writeln!(text, "{name} = {value:?}").unwrap();
     }
     let start = random.between(-200.0, -1.0);
@@ -244,8 +239,7 @@ fn built_as_the_guide_says(folder: &Path) -> Vec<&'static str> {
         if compiler(variable, default).is_none() {
             return false;
         }
-        let outcome = shell(folder, line);
-        assert_eq!(outcome.code, Some(0), "{line}\n{}", outcome.stderr);
+        shell(folder, line).ended(0);
         true
     });
     built.map(|(_, (_, id))| id).collect()
@@ -274,14 +268,13 @@ fn all_languages_refuse_alike() {
         ] {
             let place = folder.path();
             fs::write(place.join("driver.toml"), text(dilatancy, tensile)).unwrap();
-            let outcome = pilum(place, &["point", "driver.toml"]);
-            assert_eq!(outcome.code, Some(1), "{id}: {}", outcome.stderr);
+            let outcome = pilum(place, &["point", "driver.toml"]).ended(1);
             let says = if says == "≥" {
                 "is outside [0, 90)"
             } else {
                 says
             };
-            assert!(outcome.says(says), "{id}: {}", outcome.stderr);
+            outcome.shows(says);
         }
     }
 }

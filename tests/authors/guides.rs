@@ -47,8 +47,7 @@ fn follow(kind: &str, look: impl Fn(&Path)) {
             "--kind",
             kind,
         ];
-        let written = pilum(place.path(), &arguments);
-        assert_eq!(written.code, Some(0), "{language}: {}", written.stderr);
+        pilum(place.path(), &arguments).ended(0);
         let project = place.path().join("clay_or_joint");
         let commands = commands(&project.join("README.md"));
         assert_eq!(commands.len(), 6, "{commands:?}");
@@ -57,14 +56,7 @@ fn follow(kind: &str, look: impl Fn(&Path)) {
             if command.starts_with("pilum check") && !has_check(place.path()) {
                 continue;
             }
-            let outcome = shell(&project, &command);
-            assert_eq!(
-                outcome.code,
-                Some(0),
-                "{language}, {kind}: {command}\n{}{}",
-                outcome.stdout,
-                outcome.stderr
-            );
+            let outcome = shell(&project, &command).ended(0);
             let warned = outcome.stderr.contains("warning");
             assert!(!warned, "{language}, {kind}: {command}\n{}", outcome.stderr);
         }

@@ -9,6 +9,7 @@ use law::{Opener, Operator, SearchPath, Strided};
 use std::process::Command;
 use tempfile::TempDir;
 use tests::needs::compiler;
+use tests::or_skip;
 use tests::words::rows_of;
 
 #[test]
@@ -85,9 +86,7 @@ fn an_initial_state_in_cpp_knows_its_components() {
 /// Classes of one name in two libraries that hide nothing: C++ has the tables of such classes once in a process.
 #[test]
 fn classes_of_one_name_in_two_libraries_stay_apart() {
-    let Some(cxx) = compiler("CXX", "c++") else {
-        return;
-    };
+    let cxx = or_skip!(compiler("CXX", "c++"));
     let folder = TempDir::new().unwrap();
     let text = std::fs::read_to_string(repository("tests/authors/two_laws.cpp")).unwrap();
     let opener = Opener::default();
@@ -112,9 +111,7 @@ fn classes_of_one_name_in_two_libraries_stay_apart() {
 #[test]
 fn many_internal_variables_are_refused_or_carried() {
     let source = repository("tests/authors/many_states.c");
-    let Some(cc) = compiler("CC", "cc") else {
-        return;
-    };
+    let cc = or_skip!(compiler("CC", "cc"));
     for (room, says) in [(None, Some("define PILUM_MAX_STATES")), (Some(400), None)] {
         let folder = TempDir::new().unwrap();
         let to = folder.path().join("libmany_states.so");
@@ -139,9 +136,7 @@ fn many_internal_variables_are_refused_or_carried() {
 /// What a law frees is not told as kept, though the allocator keeps blocks of many sizes for later.
 #[test]
 fn freed_blocks_of_many_sizes_are_no_leak() {
-    let Some(cc) = compiler("CC", "cc") else {
-        return;
-    };
+    let cc = or_skip!(compiler("CC", "cc"));
     let folder = TempDir::new().unwrap();
     let text = std::fs::read_to_string(repository("tests/authors/many_states.c")).unwrap();
     let blocks = "static size_t calls;
@@ -174,9 +169,7 @@ fn freed_blocks_of_many_sizes_are_no_leak() {
 /// The same law in C++ does not compile.
 #[test]
 fn a_class_with_too_many_internal_variables_does_not_compile() {
-    let Some(cxx) = compiler("CXX", "c++") else {
-        return;
-    };
+    let cxx = or_skip!(compiler("CXX", "c++"));
     let text = std::fs::read_to_string(repository("tests/authors/two_laws.cpp")).unwrap();
     for (room, compiles) in [("256", true), ("0", false)] {
         let folder = TempDir::new().unwrap();
@@ -220,9 +213,7 @@ call add_parameter('x', 'x', '-', 'X.', choices=[('a', k=1, 40)]) | more labels 
             );
         assert_ne!(changed, text);
         std::fs::write(&source, changed).unwrap();
-        let Some(compiler) = compiler("FC", "gfortran") else {
-            return;
-        };
+        let compiler = or_skip!(compiler("FC", "gfortran"));
         let mut command = Command::new(compiler);
         command.args(["-frecursive", "-shared", "-fPIC", "-fvisibility=hidden"]);
         command.arg(repository("abi/include/pilum_law.f90"));

@@ -19,9 +19,8 @@ fn refuses_names_that_cannot_be_ids() {
         ("elastic", "cpp", "there is a law `elastic` already"),
     ] {
         let place = TempDir::new().unwrap();
-        let outcome = pilum(place.path(), &["new-law", name, "--language", language]);
-        assert_eq!(outcome.code, Some(1), "{name}: {}", outcome.stderr);
-        assert!(outcome.says(why), "{name}: {}", outcome.stderr);
+        let outcome = pilum(place.path(), &["new-law", name, "--language", language]).ended(1);
+        outcome.shows(why);
         assert_eq!(outcome.stdout, "");
         assert_eq!(fs::read_dir(place.path()).unwrap().count(), 0, "{name}");
     }

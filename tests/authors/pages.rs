@@ -28,6 +28,7 @@ use std::process::Command;
 use tempfile::TempDir;
 use tests::figure::{alike, bless};
 use tests::place::Place;
+use tests::words::has;
 
 /// A fenced block of a page.
 #[derive(Debug)]
@@ -498,9 +499,6 @@ fn the_map_names_every_page() {
     for page in pages {
         let page: &Path = page.strip_prefix(&host).unwrap();
         let name = page.to_str().unwrap().to_owned();
-        assert!(
-            map.contains(&format!("({name})")),
-            "host/README.md does not name {name}"
-        );
+        has(&map, format!("({name})"));
     }
 }

@@ -18,8 +18,7 @@ use tests::links::anchor;
 /// What the program puts out.
 fn printed(arguments: &[&str]) -> String {
     let place = TempDir::new().unwrap();
-    let outcome = pilum(place.path(), arguments);
-    assert_eq!(outcome.code, Some(0), "{arguments:?}: {}", outcome.stderr);
+    let outcome = pilum(place.path(), arguments).ended(0);
     outcome.stdout
 }
 
@@ -497,14 +496,7 @@ fn every_example_runs() {
             if command[0] == "calibrate" && is_of_test {
                 continue;
             }
-            let outcome = pilum(place.path(), &[command, &[file.as_str()]].concat());
-            assert_eq!(
-                outcome.code,
-                Some(0),
-                "{name}, line {}: {}",
-                block.line,
-                outcome.stderr
-            );
+            pilum(place.path(), &[command, &[file.as_str()]].concat()).ended(0);
             ran += 1;
         }
         assert!(ran > 3, "{name}: {ran}");

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use tests::words::words;
 
 /// For every room the rooms that it is on.
 type Arrows = BTreeMap<String, BTreeSet<String>>;
@@ -129,16 +130,8 @@ fn what_is_built_for_the_program_serves_all() {
     let all = features(&["--workspace"]).unwrap();
     assert!(all.len() > 150, "{}", all.len());
     // With what libFuzzer needs alone.
-    let of_libfuzzer = [
-        "arbitrary",
-        "cc",
-        "find-msvc-tools",
-        "fuzz",
-        "jobserver",
-        "libc",
-        "libfuzzer-sys",
-        "shlex",
-    ];
+    let of_libfuzzer =
+        words("arbitrary cc find-msvc-tools fuzz jobserver libc libfuzzer-sys shlex");
     let fuzz: [&str; 4] = ["-p", "fuzz", "--features", "libfuzzer"];
     for (part, alone) in [
         (&[][..], &[][..]),

@@ -6,41 +6,21 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use tests::words::rows_of;
 
 /// Places that may have `unsafe`, and their purpose. A folder has the name of the file it belongs to.
-const UNSAFE: [(&str, &str); 10] = [
-    ("abi/src/raw.rs", "types of C functions"),
-    (
-        "abi/src/access.rs",
-        "points, messages and texts in memory of the host",
-    ),
-    (
-        "abi/src/export.rs",
-        "the entry of a library, written by a macro",
-    ),
-    ("abi/src/export", "tests of that entry"),
-    (
-        "abi/bridges/src",
-        "the same law as UMAT, for MFront, for CalculiX",
-    ),
-    (
-        "host/runs/src/memory.rs",
-        "the allocator, which ends the program with a message",
-    ),
-    (
-        "host/law/src/process/child/copy.rs",
-        "the copy of the program that calls laws, made before there is a second thread",
-    ),
-    ("host/law/src/library.rs", "opening libraries"),
-    (
-        "host/law/src/library",
-        "descriptions and calls of laws, foreign routines, memory shared with workers, calls of `pilum check`",
-    ),
-    (
-        "tests/fuzz/src/description.rs",
-        "descriptions from random bytes",
-    ),
-];
+const UNSAFE: &str = "
+abi/src/raw.rs | types of C functions
+abi/src/access.rs | points, messages and texts in memory of the host
+abi/src/export.rs | the entry of a library, written by a macro
+abi/src/export | tests of that entry
+abi/bridges/src | the same law as UMAT, for MFront, for CalculiX
+host/runs/src/memory.rs | the allocator, which ends the program with a message
+host/law/src/process/child/copy.rs | the copy of the program that calls laws, made before there is a second thread
+host/law/src/library.rs | opening libraries
+host/law/src/library | descriptions and calls of laws, foreign routines, memory shared with workers, calls of `pilum check`
+tests/fuzz/src/description.rs | descriptions from random bytes
+";
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
@@ -259,13 +239,14 @@ fn unsafe_code_is_confined_and_counted() {
     for folder in ["abi", "host", "models", "tests"] {
         sources(&root.join(folder), &mut found);
     }
+    let places = rows_of::<2>(UNSAFE);
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     let mut elsewhere = Vec::new();
     for path in &found {
         let n = count(&std::fs::read_to_string(path).unwrap());
-        let within = |place: &&(&str, &str)| path.starts_with(root.join(place.0));
-        match UNSAFE.iter().find(within) {
-            Some((place, _)) => *counts.entry(place).or_default() += n,
+        let within = |place: &&[&str; 2]| path.starts_with(root.join(place[0]));
+        match places.iter().find(within) {
+            Some([place, _]) => *counts.entry(place).or_default() += n,
             None if n > 0 => elsewhere.push(format!("{}: {n}", path.display())),
             None => {}
         }
@@ -276,7 +257,7 @@ fn unsafe_code_is_confined_and_counted() {
         elsewhere.join(", ")
     );
     let mut table = "\n| where | what for | `unsafe` |\n|---|---|---|\n".to_owned();
-    for (place, purpose) in UNSAFE {
+    for [place, purpose] in places {
         let n = counts.get(place).copied().unwrap_or(0);
         writeln!(table, "| `{place}` | {purpose} | {n} |").unwrap();
     }

@@ -53,6 +53,24 @@ fn run_in(
     calibrate(&calibration, folder, &options, &mut |_| ())
 }
 
+/// One of its words has all of these parts, between ` | `.
+#[track_caller]
+fn says(outcome: &Outcome, parts: &str) {
+    let mut words = outcome.words.iter();
+    let found = words.any(|word| parts.split(" | ").all(|part| word.contains(part)));
+    assert!(found, "{parts}: {:#?}", outcome.words);
+}
+
+#[track_caller]
+fn does_not_say(outcome: &Outcome, part: &str) {
+    let mut words = outcome.words.iter();
+    assert!(
+        !words.any(|word| word.contains(part)),
+        "{:#?}",
+        outcome.words
+    );
+}
+
 /// Two columns that a driver computes, at places along the first.
 fn computed(driver: &str, columns: [&str; 2], at: &[f64]) -> Vec<f64> {
     let driver = tests::driver::of_text(driver).unwrap();

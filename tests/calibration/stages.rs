@@ -1,7 +1,7 @@
 //! Stages, held-out tests and fixed parameters.
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
-use crate::{computed, number, run, write_points};
+use crate::{computed, number, run, says, write_points};
 use std::fs;
 use std::path::PathBuf;
 use tempfile::TempDir;
@@ -66,12 +66,7 @@ fn stages_fit_their_own_parameters_to_their_own_tests() {
     let outcome = run(&staged, &[]).unwrap();
     assert_eq!(outcome.stages[0].group.tests, [2]);
     assert_eq!(outcome.stages[1].group.tests, [0, 2]);
-    assert!(
-        outcome
-            .words
-            .iter()
-            .any(|word| word.contains("a last stage with all of them"))
-    );
+    says(&outcome, "a last stage with all of them");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "part of the tests")]
 
 use crate::coverage::{Noise, at_most};
-use crate::{computed, holds, number, run, write_points};
+use crate::{computed, holds, number, run, says, write_points};
 use runs::calibration::Outcome;
 use std::fs;
 use std::path::Path;
@@ -54,6 +54,11 @@ fn warns(outcome: &Outcome, part: &str) -> bool {
     warnings.iter().any(|word| word.contains(part))
 }
 
+#[track_caller]
+fn assert_warns(outcome: &Outcome, part: &str) {
+    assert!(warns(outcome, part), "{:#?}", outcome.words);
+}
+
 const FAR: &str = "residuals are too large for noise";
 const FOLLOW: &str = "residuals follow each other";
 
@@ -66,11 +71,8 @@ fn slack_is_said_aloud_and_an_offset_cures_it() {
     // The stiffness is off by a factor of two, and its interval does not hold the truth.
     assert!(outcome.values[0] < 0.6 * TRUTH[0], "{:?}", outcome.values);
     assert!(!holds(&outcome, "shear_stiffness", TRUTH[0]));
-    assert!(
-        warns(&outcome, FAR) && warns(&outcome, FOLLOW),
-        "{:#?}",
-        outcome.words
-    );
+    assert_warns(&outcome, FAR);
+    assert_warns(&outcome, FOLLOW);
     // The points by name: the first ones, of the elastic part.
     let fitted = &outcome.tests[0].curves[0];
     let far: Vec<usize> = fitted
@@ -80,23 +82,11 @@ fn slack_is_said_aloud_and_an_offset_cures_it() {
         .map(|(point, _)| *point)
         .collect();
     assert!(far.starts_with(&[0, 1, 2]) && far.len() < 6, "{far:?}");
-    assert!(
-        warns(&outcome, "at jump_t = 7.69231e-5 (+"),
-        "{:#?}",
-        outcome.words
-    );
-    let said = outcome
-        .words
-        .iter()
-        .any(|word| word.contains("times the noise that is given"));
-    assert!(said, "{:#?}", outcome.words);
+    assert_warns(&outcome, "at jump_t = 7.69231e-5 (+");
+    says(&outcome, "times the noise that is given");
     // The same where the file says nothing of the noise.
     let unknown = fit(place.path(), &points, "", "starts = 4");
-    assert!(
-        warns(&unknown, "times the scatter of the other points"),
-        "{:#?}",
-        unknown.words
-    );
+    assert_warns(&unknown, "times the scatter of the other points");
 
     let free = "noise = 0.8\noffset_x = { min = 0.0, max = 5e-4 }";
     let cured = fit(place.path(), &points, free, "starts = 4");
@@ -126,11 +116,7 @@ fn scales_and_offsets_of_both_axes_are_found() {
     let curve = "noise = 0.02\noffset_y = { min = -5.0, max = 5.0 }\nscale_y = { min = 0.05, max = 0.5, start = 0.2 }";
     // The scale is known by a strength that is.
     let outcome = fit(place.path(), &points, curve, "starts = 4");
-    assert!(
-        outcome.words.iter().any(|word| word.contains("told")),
-        "{:#?}",
-        outcome.words
-    );
+    says(&outcome, "told");
     let file = place.path().join("calibration.toml");
     let text = fs::read_to_string(&file).unwrap();
     let text = text.replace("friction_angle = { min = 20.0, max = 45.0 }", "");

@@ -9,6 +9,7 @@ use tempfile::TempDir;
 use tests::case::{column, run_case, table};
 use tests::place::case;
 use tests::tolerance::{EQUILIBRIUM, near};
+use tests::words::words;
 
 fn run(name: &str) -> TempDir {
     let folder = TempDir::new().unwrap();
@@ -47,15 +48,7 @@ fn every_probe_equals_that_of_an_independent_program() {
     let reference = reference();
     assert_eq!(rows.len(), 56);
     assert_eq!(reference.len(), 56);
-    for probe in [
-        "tau_shaft",
-        "sigma_n_shaft",
-        "q_t",
-        "q_p",
-        "q_s",
-        "w_t",
-        "k_l",
-    ] {
+    for probe in words("tau_shaft sigma_n_shaft q_t q_p q_s w_t k_l") {
         let number = |row: &BTreeMap<String, String>| row[probe].parse::<f64>().unwrap();
         let largest = reference
             .iter()

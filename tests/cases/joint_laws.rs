@@ -211,11 +211,7 @@ fn a_rigid_pile_carries_what_its_load_transfer_curves_have() {
     let text = r#"
 title = "pile on load transfer curves"
 analysis = "axisymmetric"
-supports = [
-  { line = "axis", fixed = ["r"] },
-  { line = "far", fixed = ["r", "z"] },
-  { line = "bottom", fixed = ["r", "z"] },
-]
+supports = [{ line = "axis", fixed = ["r"] }, { line = "far", fixed = ["r", "z"] }, { line = "bottom", fixed = ["r", "z"] }]
 [mesh]
 origin = [0.0, -11.0]
 columns = [{ n = 1, to = 0.3 }, { n = 1, to = 0.6 }]

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use tempfile::TempDir;
 use tests::case::column;
+use tests::or_skip;
 use tests::tolerance::{DRIVER, near};
 
 const THICKNESS: f64 = 5e-3;
@@ -139,9 +140,7 @@ fn hypoplastic() -> Option<TempDir> {
 
 #[test]
 fn hypoplastic_sand_ends_in_its_critical_state() {
-    let Some(folder) = hypoplastic() else {
-        return;
-    };
+    let folder = or_skip!(hypoplastic());
     let tests = Tests::run(&folder.path().join("hypoplastic.toml"));
     // Shear at constant volume ends where the stress is isotropic but for τ: σ_11 = σ_33 = σ_n. The
     // criterion of Matsuoka and Nakai, on which critical states lie, is there

@@ -6,19 +6,9 @@ use crate::program::{BAD_INPUT, CASE, DONE, Place};
 fn refused(arguments: &[&str], says: &[&str]) {
     let place = Place::new();
     place.write("file", "");
-    let outcome = place.run(arguments);
-    assert_eq!(
-        outcome.code,
-        Some(BAD_INPUT),
-        "{arguments:?}\n{}",
-        outcome.stderr
-    );
+    let outcome = place.run(arguments).ended(BAD_INPUT);
     for text in says {
-        assert!(
-            outcome.says(text),
-            "{arguments:?} does not say {text:?}:\n{}",
-            outcome.stderr
-        );
+        outcome.shows(text);
     }
     assert_eq!(outcome.stdout, "", "{arguments:?}");
     assert_eq!(place.contents(), ["file"], "{arguments:?}");
@@ -61,13 +51,8 @@ fn help_and_version_are_no_errors() {
             concat!("pilum ", env!("CARGO_PKG_VERSION")),
         ),
     ] {
-        let outcome = Place::new().run(&arguments);
-        assert_eq!(outcome.code, Some(DONE), "{arguments:?}");
-        assert!(
-            outcome.stdout.contains(says),
-            "{arguments:?}\n{}",
-            outcome.stdout
-        );
+        let outcome = Place::new().run(&arguments).ended(DONE);
+        outcome.prints(says);
         assert_eq!(outcome.stderr, "", "{arguments:?}");
     }
 }
@@ -78,8 +63,9 @@ fn refuses_results_where_none_can_be_written() {
         let place = Place::new();
         place.write("file", "mine");
         place.write("case.toml", CASE);
-        let outcome = place.run(&["run", "case.toml", "--out", out]);
-        assert_eq!(outcome.code, Some(BAD_INPUT), "{out}\n{}", outcome.stderr);
+        let outcome = place
+            .run(&["run", "case.toml", "--out", out])
+            .ended(BAD_INPUT);
         outcome.shows(format!("cannot write {out}"));
         assert_eq!(place.contents(), ["case.toml", "file"]);
         assert_eq!(place.read("file"), "mine");

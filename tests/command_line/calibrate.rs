@@ -227,10 +227,9 @@ shear_stiffness = { laws = ["skin"] } | no case of a test has a law `skin`
 "#,
     ) {
         place.write("push.toml", file.replace("FREE", free));
-        let outcome = place.run(&["calibrate", "push.toml"]);
-        assert_eq!(outcome.code, Some(BAD_INPUT), "{free}");
-        assert!(outcome.says(says), "{free}: {}", outcome.stderr);
-        assert!(outcome.says("push.toml:4:"), "{free}: {}", outcome.stderr);
+        let outcome = place.run(&["calibrate", "push.toml"]).ended(BAD_INPUT);
+        outcome.shows(says);
+        outcome.shows("push.toml:4:");
     }
     let wrong = file.replace("FREE", "young_modulus = { laws = [\"soil\"] }");
     place.write("push.toml", wrong.replace("\"weight\"", "\"wait\""));

@@ -2,6 +2,7 @@
 
 use crate::program::{NO_EQUILIBRIUM, PLUGIN_TROUBLE, Place};
 use crate::troubled;
+use tests::or_skip;
 use tests::words::edited;
 use tests::words::rows_of;
 
@@ -17,9 +18,7 @@ fn failed(how: &str, arguments: &[&str], code: i32) -> Option<Place> {
 
 #[test]
 fn a_failed_driver_leaves_its_call() {
-    let Some(place) = failed("cut", &[], NO_EQUILIBRIUM) else {
-        return;
-    };
+    let place = or_skip!(failed("cut", &[], NO_EQUILIBRIUM));
     let text = place.read("out.failure.toml");
     let capsule: toml::Table = toml::from_str(&text).unwrap();
     assert_eq!(capsule["law"]["id"].as_str(), Some("troubled"));
@@ -49,9 +48,7 @@ fn a_failed_driver_leaves_its_call() {
 
 #[test]
 fn a_replay_repeats_the_call_and_finds_the_limit() {
-    let Some(place) = failed("cut", &[], NO_EQUILIBRIUM) else {
-        return;
-    };
+    let place = or_skip!(failed("cut", &[], NO_EQUILIBRIUM));
     // A longer increment, of which half succeeds.
     let text = place.read("out.failure.toml");
     let mut capsule: toml::Table = toml::from_str(&text).unwrap();
@@ -85,9 +82,7 @@ fn a_replay_repeats_the_call_and_finds_the_limit() {
 
 #[test]
 fn a_replay_outlives_a_crash() {
-    let Some(place) = failed("segfault", &["--isolate"], PLUGIN_TROUBLE) else {
-        return;
-    };
+    let place = or_skip!(failed("segfault", &["--isolate"], PLUGIN_TROUBLE));
     let outcome = place
         .run(&["replay", "out.failure.toml"])
         .ended(PLUGIN_TROUBLE);
@@ -96,9 +91,7 @@ fn a_replay_outlives_a_crash() {
 
 #[test]
 fn a_failed_run_leaves_its_call() {
-    let Some(place) = troubled::place("") else {
-        return;
-    };
+    let place = or_skip!(troubled::place(""));
     let outcome = place
         .run_case(troubled::case("domain"))
         .ended(NO_EQUILIBRIUM);
@@ -132,7 +125,7 @@ fn refuses_what_is_no_capsule() {
     for (text, says) in [("", "missing"), ("version = 1\nlaw = 2\n", "2")] {
         place.write("failure.toml", text);
         let outcome = place.refused(&["replay", "failure.toml"]);
-        assert!(outcome.says(says), "{text:?}: {}", outcome.stderr);
+        outcome.shows(says);
     }
     place.refused(&["replay", "missing.toml"]);
 }
@@ -155,7 +148,7 @@ t = 1e-3 => s = 1e-3 | 37:23 | has no jump `s`
         place.write("failure.toml", edited(good, &[edit]));
         let outcome = place.refused(&["replay", "failure.toml"]);
         for text in [at, says] {
-            assert!(outcome.says(text), "{edit}, {text}: {}", outcome.stderr);
+            outcome.shows(text);
         }
     }
 }

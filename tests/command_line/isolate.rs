@@ -3,6 +3,7 @@
 
 use crate::program::{NO_EQUILIBRIUM, PLUGIN_TROUBLE, Place, edited};
 use crate::troubled;
+use tests::or_skip;
 
 const WAYS: [(&str, &str); 4] = [
     ("segfault", "crashed: signal 11"),
@@ -14,24 +15,16 @@ const WAYS: [(&str, &str); 4] = [
 #[test]
 fn a_run_ends_with_what_had_converged() {
     for (how, says) in WAYS {
-        let Some(place) = troubled::place("") else {
-            return;
-        };
+        let place = or_skip!(troubled::place(""));
         place.write("case.toml", troubled::case(how));
         let arguments = ["run", "case.toml", "--out", "out", "--isolate=0.5"];
-        let outcome = place.run(&arguments);
-        assert_eq!(
-            outcome.code,
-            Some(PLUGIN_TROUBLE),
-            "{how}: {}",
-            outcome.stderr
-        );
+        let outcome = place.run(&arguments).ended(PLUGIN_TROUBLE);
         for text in [
             "phase `push`, increment 1: law `troubled`, group `layer`, element",
             says,
             "failure.toml",
         ] {
-            assert!(outcome.says(text), "{how}: {text:?}\n{}", outcome.stderr);
+            outcome.shows(text);
         }
         let history = place.read("out/history.csv");
         assert_eq!(history.lines().count(), 3, "{how}: {history}");
@@ -44,9 +37,7 @@ fn a_run_ends_with_what_had_converged() {
 #[test]
 #[cfg(target_os = "linux")]
 fn a_copy_of_a_worker_does_not_answer_too() {
-    let Some(place) = troubled::place("") else {
-        return;
-    };
+    let place = or_skip!(troubled::place(""));
     place.write("driver.toml", troubled::driver("fork"));
     let outcome = place
         .run(&["point", "driver.toml", "--csv", "out.csv", "--isolate"])
@@ -59,18 +50,12 @@ fn a_copy_of_a_worker_does_not_answer_too() {
 #[test]
 fn a_driver_ends_with_its_rows() {
     for (how, says) in WAYS {
-        let Some(place) = troubled::place("") else {
-            return;
-        };
+        let place = or_skip!(troubled::place(""));
         place.write("driver.toml", troubled::driver(how));
-        let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv", "--isolate=0.5"]);
-        assert_eq!(
-            outcome.code,
-            Some(PLUGIN_TROUBLE),
-            "{how}: {}",
-            outcome.stderr
-        );
-        assert!(outcome.says(says), "{how}: {}", outcome.stderr);
+        let outcome = place
+            .run(&["point", "driver.toml", "--csv", "out.csv", "--isolate=0.5"])
+            .ended(PLUGIN_TROUBLE);
+        outcome.shows(says);
         outcome.shows("segment 1, increment 3 of 4");
         let rows = place.read("out.csv");
         assert_eq!(rows.lines().count(), 4, "{how}: {rows}");
@@ -98,9 +83,7 @@ fn results_are_the_same_as_in_the_process() {
 
 #[test]
 fn refusals_of_laws_are_those_of_the_process() {
-    let Some(place) = troubled::place("") else {
-        return;
-    };
+    let place = or_skip!(troubled::place(""));
     place.write("driver.toml", troubled::driver("domain"));
     let outcome = place
         .run(&["point", "driver.toml", "--csv", "out.csv", "--isolate"])
@@ -110,9 +93,7 @@ fn refusals_of_laws_are_those_of_the_process() {
 
 #[test]
 fn a_library_that_crashes_when_it_is_opened_is_refused() {
-    let Some(place) = troubled::place("TROUBLE_AT_ENTRY") else {
-        return;
-    };
+    let place = or_skip!(troubled::place("TROUBLE_AT_ENTRY"));
     place.write("driver.toml", troubled::driver("cut"));
     let outcome = place
         .run(&["point", "driver.toml", "--csv", "out.csv", "--isolate"])

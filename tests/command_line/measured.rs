@@ -19,8 +19,7 @@ fn measured_points_are_drawn_as_markers() {
         let place = Place::new();
         place.write(file, text);
         let one = format!("{{ file = \"{file}\", x = \"w (mm)\", y = \"load\", y_scale = 0.1 }}");
-        let outcome = run(&place, &one);
-        assert_eq!(outcome.code, Some(DONE), "{file}: {}", outcome.stderr);
+        run(&place, &one).ended(DONE);
         let out = place.path("out");
         let svg = std::fs::read_to_string(out.join("push.svg")).unwrap();
         // Two points, and one in the legend.
@@ -78,14 +77,9 @@ fn what_cannot_be_drawn_is_refused_at_its_key() {
 "#,
     ) {
         let column = "measured = ".len() + measured.find('^').unwrap() + 1;
-        let outcome = run(&place, &measured.replacen('^', "", 1));
-        assert_eq!(outcome.code, Some(BAD_INPUT), "{measured}");
+        let outcome = run(&place, &measured.replacen('^', "", 1)).ended(BAD_INPUT);
         for text in [at, says, &format!(":{column}|")] {
-            assert!(
-                outcome.says(text),
-                "{measured}: {text:?}\n{}",
-                outcome.stderr
-            );
+            outcome.shows(text);
         }
         assert!(!place.path("out").exists(), "{measured}");
     }

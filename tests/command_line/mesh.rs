@@ -164,8 +164,12 @@ const ROW: &str = "[mesh.lines]\nwest = { y = 0.5, x = [0.0, 1.0] }\n\
     centre = { y = 0.5, x = [1.0, 1.01] }\neast = { y = 0.5, x = [1.01, 2.0] }\n\
     stub = { x = 1.01, y = [0.5, 1.0] }";
 
-/// The case with joints along these of its lines, in this order, and what its top settles.
-fn settlement(lines: &[&str]) -> Vec<f64> {
+const CROSS: &str = "[mesh.lines]\nupright = { x = 1.0 }\nwest = { y = 0.5, x = [0.0, 1.0] }\n\
+    east = { y = 0.5, x = [1.0, 2.0] }\nsouth = { x = 1.0, y = [0.0, 0.5] }\n\
+    north = { x = 1.0, y = [0.5, 1.0] }";
+
+/// The case with more lines, and joints along these of them, in this order: what its top settles.
+fn settlement(more_lines: &str, lines: &[&str]) -> Vec<f64> {
     let group = |line: &&str| {
         format!(
             "[groups.{line}]\nformulation = \"zero_thickness\"\nline = \"{line}\"\n\
@@ -174,7 +178,7 @@ fn settlement(lines: &[&str]) -> Vec<f64> {
     };
     let more: String = lines[1..].iter().map(group).collect();
     let text = edited(JOINT)
-        .replace("[mesh.lines]", ROW)
+        .replace("[mesh.lines]", more_lines)
         .replace("line = \"middle\"\n", &format!("line = \"{}\"\n", lines[0]))
         .replace("[[supports]]", &format!("{more}\n[[supports]]"))
         .replace("tau = { group = \"layer\"", "tau = { group = \"soil\"")
@@ -188,8 +192,8 @@ fn settlement(lines: &[&str]) -> Vec<f64> {
 /// come apart in the same way whatever the order of the groups.
 #[test]
 fn joints_may_end_on_one_another() {
-    let one = settlement(&["middle", "stub"]);
-    let without = settlement(&["middle"]);
+    let one = settlement(ROW, &["middle", "stub"]);
+    let without = settlement(ROW, &["middle"]);
     assert!(
         one.iter()
             .zip(&without)
@@ -200,7 +204,7 @@ fn joints_may_end_on_one_another() {
         &["stub", "west", "centre", "east"],
         &["west", "centre", "stub", "east"],
     ] {
-        for (other, one) in settlement(lines).iter().zip(&one) {
+        for (other, one) in settlement(ROW, lines).iter().zip(&one) {
             approx::assert_relative_eq!(other, one, max_relative = 1e-6);
         }
     }
@@ -209,9 +213,9 @@ fn joints_may_end_on_one_another() {
 /// The joint of the case in one group, and in three that go on from one another: the same answer.
 #[test]
 fn joints_may_go_on_from_one_another() {
-    let one = settlement(&["middle"]);
+    let one = settlement(ROW, &["middle"]);
     for parts in [["west", "centre", "east"], ["centre", "east", "west"]] {
-        for (parts, one) in settlement(&parts).iter().zip(&one) {
+        for (parts, one) in settlement(ROW, &parts).iter().zip(&one) {
             approx::assert_relative_eq!(parts, one, max_relative = 1e-9);
         }
     }
@@ -221,30 +225,7 @@ fn joints_may_go_on_from_one_another() {
 /// two that go on from one another where they cross: the same answer.
 #[test]
 fn joints_may_cross() {
-    let settlement = |lines: &[&str]| {
-        let group = |line: &&str| {
-            format!(
-                "[groups.{line}]\nformulation = \"zero_thickness\"\nline = \"{line}\"\n\
-                 law = \"joint\"\n"
-            )
-        };
-        let more: String = lines[1..].iter().map(group).collect();
-        let text = edited(JOINT)
-            .replace(
-                "[mesh.lines]",
-                "[mesh.lines]\nupright = { x = 1.0 }\nwest = { y = 0.5, x = [0.0, 1.0] }\n\
-                 east = { y = 0.5, x = [1.0, 2.0] }\nsouth = { x = 1.0, y = [0.0, 0.5] }\n\
-                 north = { x = 1.0, y = [0.5, 1.0] }",
-            )
-            .replace("line = \"middle\"\n", &format!("line = \"{}\"\n", lines[0]))
-            .replace("[[supports]]", &format!("{more}\n[[supports]]"))
-            .replace("tau = { group = \"layer\"", "tau = { group = \"soil\"")
-            .replace("\"traction_t\"", "\"stress_12\"");
-        let place = Place::new();
-        place.done_case(text);
-        tests::case::column(&place.path("out/history.csv"), "settlement")
-    };
-    let one = settlement(&["middle", "upright"]);
+    let one = settlement(CROSS, &["middle", "upright"]);
     for other in [
         &["upright", "middle"][..],
         &["upright", "west", "east"],
@@ -252,7 +233,7 @@ fn joints_may_cross() {
         &["east", "west", "upright"],
         &["west", "south", "east", "north"],
     ] {
-        for (one, other) in one.iter().zip(&settlement(other)) {
+        for (one, other) in one.iter().zip(&settlement(CROSS, other)) {
             approx::assert_relative_eq!(one, other, max_relative = 1e-6);
         }
     }

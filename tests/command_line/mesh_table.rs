@@ -244,6 +244,6 @@ fn shows_and_draws_the_mesh_of_a_case() {
     let two = place.refused(&["mesh", ".", "--draw", "two.svg"]);
     two.shows("--draw is for one mesh");
     let one = place.run(&["mesh", ".", "--variant", "b"]);
-    assert!(one.stdout.contains("variant `b`"), "{}", one.stderr);
+    one.prints("variant `b`");
     assert!(!one.stdout.contains("variant `a`"), "{}", one.stdout);
 }

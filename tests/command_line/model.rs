@@ -155,10 +155,7 @@ fn place() -> Place {
 }
 
 fn close(value: f64, expected: f64, what: &str) {
-    assert!(
-        (value - expected).abs() < 1e-6 * expected.abs().max(1.0),
-        "{what}: {value}, not {expected}"
-    );
+    tests::tolerance::close(what, value, expected, 1e-6 * expected.abs().max(1.0));
 }
 
 #[test]

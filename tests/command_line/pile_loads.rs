@@ -12,6 +12,7 @@ use crate::program::Place;
 use serde_json::Value;
 use std::f64::consts::PI;
 use tests::tolerance::near;
+use tests::words::words;
 
 const RADIUS: f64 = 0.25;
 const LENGTH: f64 = 10.0;
@@ -24,11 +25,7 @@ fn ring(cohesion: f64, phases: &str) -> String {
     format!(
         r#"
 analysis = "axisymmetric"
-supports = [
-  {{ line = "axis", fixed = ["r"] }},
-  {{ line = "outer", fixed = ["r"] }},
-  {{ line = "under", fixed = ["r", "z"] }},
-]
+supports = [{{ line = "axis", fixed = ["r"] }}, {{ line = "outer", fixed = ["r"] }}, {{ line = "under", fixed = ["r", "z"] }}]
 [mesh]
 columns = [{{ n = 1, to = {RADIUS} }}, {{ n = 1, to = 0.5 }}]
 rows = [{{ n = 8, to = {LENGTH} }}]
@@ -60,10 +57,7 @@ head = "head"
 }
 
 fn close(found: f64, expected: f64, scale: f64, what: &str) {
-    assert!(
-        (found - expected).abs() <= scale * (1.0 + expected.abs()),
-        "{what}: {found} for {expected}"
-    );
+    tests::tolerance::close(what, found, expected, scale * (1.0 + expected.abs()));
 }
 
 fn of<'r>(table: &'r [Row], place: &Row) -> Vec<&'r Row> {
@@ -265,13 +259,7 @@ fn cycles_are_those_by_hand() {
         assert_eq!(row["phase"], "cycles");
         assert_eq!(row["cycle"], (number + 1).to_string());
         let [s_max, s_min, max, min, permanent] = expected;
-        let names = [
-            "settlement_max",
-            "settlement_min",
-            "load_max",
-            "load_min",
-            "permanent",
-        ];
+        let names = words("settlement_max settlement_min load_max load_min permanent");
         for (name, expected) in names.into_iter().zip(expected) {
             close(value(row, name), expected, 1e-5, name);
         }

@@ -489,9 +489,11 @@ fn choices_of_the_solver_without_effect_are_said_with_their_line() {
     let text = edited(&[]);
     let at = text.find("[solver]").unwrap();
     let place = format!("case.toml:{}:", text[..at].matches('\n').count() + 1);
-    let says = "`control = \"viscous\"` has no effect with `method = \"modified_newton\"`";
-    let viscous = r#"[solver] => [solver]\nmethod = "modified_newton"\ncontrol = "viscous""#;
-    warns(&[viscous], &[&place, says]);
+    for method in ["modified_newton", "initial_stress"] {
+        let says = format!("`control = \"viscous\"` has no effect with `method = \"{method}\"`");
+        let viscous = format!("[solver] => [solver]\nmethod = \"{method}\"\ncontrol = \"viscous\"");
+        warns(&[&viscous], &[&place, &says]);
+    }
     let says = "`tangents = \"differences\"` has no effect with `method = \"initial_stress\"`";
     let differences =
         r#"[solver] => [solver]\nmethod = "initial_stress"\ntangents = "differences""#;

@@ -199,9 +199,7 @@ supports = [{ line = "bottom", fixed = ["x", "y"] }]
 columns = [{ n = 2, to = 1.0 }]
 rows = [{ n = 2, to = 1.0 }, { n = 1, to = 1.01 }, { n = 2, to = 2.0 }]
 region = [{ group = "soil" }, { group = "layer", y = [1.0, 1.01] }]
-[mesh.lines]
-bottom = { y = 0.0 }
-top = { y = 2.0 }
+lines = { bottom = { y = 0.0 }, top = { y = 2.0 } }
 [laws.soil]
 law = "elastic"
 parameters = { young_modulus = 1e8, poisson_ratio = 0.3 }
@@ -396,8 +394,7 @@ fn files_that_were_changed_since_the_checkpoint_are_named() {
             let mut bytes = good.clone();
             bytes[at] ^= 1;
             std::fs::write(&path, bytes).unwrap();
-            let outcome = place.run(&run);
-            assert_eq!(outcome.code, Some(BAD_INPUT), "{file}: {}", outcome.stderr);
+            let outcome = place.run(&run).ended(BAD_INPUT);
             outcome.shows(file).shows("changed or removed");
         }
         std::fs::write(&path, good).unwrap();

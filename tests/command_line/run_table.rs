@@ -106,9 +106,8 @@ broken | not written by a run
 other | other/summary.json has no `status`
 ",
     ) {
-        let outcome = place.run(&["table", folder]);
-        assert_eq!(outcome.code, Some(BAD_INPUT), "{folder}");
-        assert!(outcome.says(says), "{folder}: {says:?}\n{}", outcome.stderr);
+        let outcome = place.run(&["table", folder]).ended(BAD_INPUT);
+        outcome.shows(says);
         assert_eq!(outcome.stdout, "", "{folder}");
     }
 }

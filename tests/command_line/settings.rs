@@ -19,19 +19,9 @@ fn run(place: &Place, settings: &[&str]) -> Outcome {
 /// Refuses a setting at a place in it.
 fn refused(setting: &str, at: &str, says: &str) {
     let place = Place::new();
-    let outcome = run(&place, &[setting]);
-    assert_eq!(
-        outcome.code,
-        Some(BAD_INPUT),
-        "{setting}: {}",
-        outcome.stderr
-    );
+    let outcome = run(&place, &[setting]).ended(BAD_INPUT);
     for text in [&format!("--set:{at}"), says, setting] {
-        assert!(
-            outcome.says(text),
-            "{setting} does not say {text:?}:\n{}",
-            outcome.stderr
-        );
+        outcome.shows(text);
     }
     assert_eq!(place.contents(), ["case.toml"], "{setting}");
 }
@@ -44,16 +34,12 @@ fn summary(place: &Place, folder: &str) -> Value {
 #[test]
 fn settings_override_the_file_and_are_recorded() {
     let place = Place::new();
-    let settings = [
-        "laws.joint.parameters.cohesion=20",
-        "solver.max_iterations=40",
-        "phase.2.increments=3",
-        "phase.push.displacement.1.x=2e-5",
-        "output.profile=never",
-    ];
+    let settings = words(
+        "laws.joint.parameters.cohesion=20 solver.max_iterations=40 phase.2.increments=3 phase.push.displacement.1.x=2e-5 output.profile=never",
+    );
     run(&place, &settings).ended(DONE);
     let set = summary(&place, "out");
-    assert_eq!(set["set"], Value::from(settings.to_vec()));
+    assert_eq!(set["set"], Value::from(settings.clone()));
     assert_eq!(
         set["laws"]["joint (interface_2d)"]["parameters"]["cohesion"],
         20.0

@@ -7,6 +7,7 @@ use crate::troubled;
 use std::os::unix::process::CommandExt;
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
+use tests::or_skip;
 use tests::words::has;
 
 /// What a shell says of a program that was stopped.
@@ -66,9 +67,7 @@ fn slow_case() -> String {
 #[test]
 fn ctrl_c_to_the_whole_group_stops_a_run() {
     for isolate in [&[][..], &["--isolate"]] {
-        let Some(place) = troubled::place("") else {
-            return;
-        };
+        let place = or_skip!(troubled::place(""));
         place.write("case.toml", slow_case());
         let arguments = [&["run", "case.toml", "--out", "out"], isolate].concat();
         let mut child = start(&place, &arguments);
@@ -84,9 +83,7 @@ fn ctrl_c_to_the_whole_group_stops_a_run() {
 #[test]
 fn stolen_signals_stop_a_run() {
     for signal in ["INT", "TERM"] {
-        let Some(place) = troubled::place("TROUBLE_IN_CREATE=SIGNALS") else {
-            return;
-        };
+        let place = or_skip!(troubled::place("TROUBLE_IN_CREATE=SIGNALS"));
         place.write("case.toml", slow_case());
         let mut child = start(&place, &["run", "case.toml", "--out", "out", "--no-probe"]);
         wait_for(&place, "phase push: increment 1/");
@@ -98,9 +95,7 @@ fn stolen_signals_stop_a_run() {
 
 #[test]
 fn a_law_that_never_returns_is_stopped() {
-    let Some(place) = troubled::place("") else {
-        return;
-    };
+    let place = or_skip!(troubled::place(""));
     place.write("case.toml", troubled::case("loop"));
     let mut child = start(&place, &["run", "case.toml", "--out", "out"]);
     wait_for(&place, "phase push");
@@ -108,10 +103,8 @@ fn a_law_that_never_returns_is_stopped() {
     send("TERM", &child.id().to_string());
     assert_eq!(code(&mut child, &place), Some(STOPPED), "{}", said(&place));
     let text = said(&place);
-    assert!(
-        text.contains("law `troubled`") && text.contains("layer"),
-        "{text}"
-    );
+    has(&text, "law `troubled`");
+    has(&text, "layer");
     assert_eq!(place.summary()["status"], "interrupted");
     let history = place.read("out/history.csv");
     assert_eq!(history.lines().count(), 3, "{history}");
@@ -133,9 +126,7 @@ fn a_law_that_never_returns_is_stopped() {
 /// A tangent that is wrong by a factor of 10⁵ takes hundreds of thousands of iterations and many cut-backs.
 #[test]
 fn a_hopeless_increment_is_stopped_within_it() {
-    let Some(place) = troubled::place("SHEAR_TANGENT=1.0e5") else {
-        return;
-    };
+    let place = or_skip!(troubled::place("SHEAR_TANGENT=1.0e5"));
     let edits = [
         r#"max_iterations = 20 => max_iterations = 10000\nmethod = "newton"\ntangents = "law""#,
         "limit = 1.0e-6 => limit = 1.0",
@@ -174,10 +165,8 @@ fn studies_say_how_far_they_are_and_stop() {
         send("INT", &format!("-{}", child.id()));
         assert_eq!(code(&mut child, &place), Some(STOPPED), "{}", said(&place));
         let text = said(&place);
-        assert!(
-            text.contains("left") && text.contains("stopped as asked"),
-            "{text}"
-        );
+        has(&text, "left");
+        has(&text, "stopped as asked");
         assert!(!place.path("out/.trial").exists(), "{command}");
     }
 }
@@ -255,9 +244,7 @@ fn a_stopped_search_for_an_accuracy_goes_on() {
 
 #[test]
 fn a_child_does_not_outlive_the_program() {
-    let Some(place) = troubled::place("") else {
-        return;
-    };
+    let place = or_skip!(troubled::place(""));
     place.write("case.toml", troubled::case("loop"));
     let mut child = start(&place, &["run", "case.toml", "--out", "out"]);
     wait_for(&place, "phase push");

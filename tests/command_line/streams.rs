@@ -2,6 +2,7 @@
 #![cfg(target_os = "linux")]
 
 use crate::program::{BAD_INPUT, CASE, DONE, Outcome, PLUGIN_TROUBLE, Place};
+use tests::words::has;
 
 /// Commands that print, with a library, a driver and a capsule at hand.
 const PRINT: [&[&str]; 12] = [
@@ -35,23 +36,11 @@ fn place() -> Place {
 #[test]
 fn a_full_output_is_said_in_a_line() {
     for arguments in PRINT {
-        let outcome = place().run_limited("exec > /dev/full", arguments);
-        assert_eq!(
-            outcome.code,
-            Some(BAD_INPUT),
-            "{arguments:?}: {}",
-            outcome.stderr
-        );
-        assert!(
-            outcome.says("No space left"),
-            "{arguments:?}: {}",
-            outcome.stderr
-        );
-        assert!(
-            !outcome.says("panicked"),
-            "{arguments:?}: {}",
-            outcome.stderr
-        );
+        let outcome = place()
+            .run_limited("exec > /dev/full", arguments)
+            .ended(BAD_INPUT);
+        outcome.shows("No space left");
+        outcome.hides("panicked");
     }
 }
 
@@ -83,13 +72,9 @@ fn a_pipe_that_nobody_reads_any_more_is_no_error() {
 fn devices_and_pipes_are_no_libraries() {
     for file in ["/dev/zero", "./pipe"] {
         for command in ["inspect", "check"] {
-            let outcome = place().run_limited("mkfifo pipe; ulimit -t 10", &[command, file]);
-            assert_eq!(
-                outcome.code,
-                Some(BAD_INPUT),
-                "{command}: {}",
-                outcome.stderr
-            );
+            let outcome = place()
+                .run_limited("mkfifo pipe; ulimit -t 10", &[command, file])
+                .ended(BAD_INPUT);
             outcome.shows("expected a file");
         }
     }
@@ -98,22 +83,14 @@ fn devices_and_pipes_are_no_libraries() {
 #[test]
 fn devices_and_endless_files_are_no_input() {
     for command in ["run", "point", "lock", "replay"] {
-        let outcome = place().run_limited("ulimit -t 10", &[command, "/dev/zero"]);
-        assert_eq!(
-            outcome.code,
-            Some(BAD_INPUT),
-            "{command}: {}",
-            outcome.stderr
-        );
+        let outcome = place()
+            .run_limited("ulimit -t 10", &[command, "/dev/zero"])
+            .ended(BAD_INPUT);
         outcome.shows("it is a device");
         let long = "truncate -s 100G long.toml; ulimit -t 10";
-        let outcome = place().run_limited(long, &[command, "long.toml"]);
-        assert_eq!(
-            outcome.code,
-            Some(BAD_INPUT),
-            "{command}: {}",
-            outcome.stderr
-        );
+        let outcome = place()
+            .run_limited(long, &[command, "long.toml"])
+            .ended(BAD_INPUT);
         outcome.shows("longer than 16 MB");
     }
     // Shells write `<(…)` as a pipe.
@@ -145,8 +122,8 @@ fn memory_that_runs_out_is_said() {
         };
         let outcome = place.run_limited(&format!("{new} ulimit -v {limit}"), &arguments);
         let said = &outcome.stderr;
-        assert!(!outcome.says("panicked"), "{limit}: {said}");
-        assert!(!outcome.says("internal error"), "{limit}: {said}");
+        outcome.hides("panicked");
+        outcome.hides("internal error");
         if outcome.says("failed to map segment") {
             // Just too little for a library.
             assert_eq!(outcome.code, Some(PLUGIN_TROUBLE), "{limit}: {said}");
@@ -157,10 +134,7 @@ fn memory_that_runs_out_is_said() {
         let untried = is_new && outcome.says("not enough memory to try library");
         assert!(needed || untried, "{limit}: {said}");
         if let Ok(summary) = std::fs::read_to_string(place.path("out/summary.json")) {
-            assert!(
-                summary.contains("\"status\": \"stopped\""),
-                "{limit}: {said}"
-            );
+            has(&summary, "\"status\": \"stopped\"");
             assert!(summary.contains("not enough memory"), "{limit}: {said}");
             let history = place.read("out/history.csv");
             assert!(history.ends_with('\n'), "{limit}");

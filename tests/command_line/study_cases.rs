@@ -8,6 +8,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use tests::needs;
+use tests::or_skip;
 
 pub(crate) fn case(name: &str) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -100,9 +101,7 @@ fn snakemake() -> Option<PathBuf> {
 
 #[test]
 fn snakemake_carries_out_a_study() {
-    let Some(program) = snakemake() else {
-        return;
-    };
+    let program = or_skip!(snakemake());
     let place = Place::new();
     let file = format!("{}/Snakefile", case("study_snakemake"));
     let mut command = with_pilum(&place, program.to_str().unwrap());

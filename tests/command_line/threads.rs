@@ -6,6 +6,7 @@ use crate::troubled;
 use std::collections::BTreeMap;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
+use tests::or_skip;
 
 /// A short run works where no thread can be started; a request for threads then fails with a
 /// message.
@@ -17,9 +18,7 @@ fn a_small_run_needs_no_thread() {
     let [source, library] = ["none.c", "none.so"].map(|name| place.path(name));
     let mut compiler = Command::new("cc");
     compiler.args(["-shared", "-fPIC", "-fno-builtin", "-o"]);
-    let Some(output) = tests::needs::output(compiler.arg(&library).arg(&source)) else {
-        return;
-    };
+    let output = or_skip!(tests::needs::output(compiler.arg(&library).arg(&source)));
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");
     let none = [("LD_PRELOAD", library.to_str().unwrap())];
@@ -35,9 +34,7 @@ fn a_small_run_needs_no_thread() {
 /// Each of its points takes 20 ms in the second phase.
 #[test]
 fn a_small_run_that_takes_long_has_all_threads() {
-    let Some(place) = troubled::place("") else {
-        return;
-    };
+    let place = or_skip!(troubled::place(""));
     place.write("case.toml", troubled::case("sleep"));
     let processors = std::thread::available_parallelism().unwrap().get();
     for (arguments, n) in [(&[][..], processors), (&["--threads", "3"], 3)] {

@@ -6,6 +6,7 @@ mod accuracy;
 use crate::program::{BAD_INPUT, DONE, JOINT, Outcome, Place, edited};
 use std::collections::BTreeMap;
 use tests::case::table;
+use tests::words::words;
 
 /// Sheared at constant normal stiffness: the law is integrated implicitly, first order.
 const DRIVER: &str = r#"title = "A joint at constant normal stiffness"
@@ -205,35 +206,27 @@ fn refuses_what_it_cannot_study() {
             tau = { group = \"layer\", quantity = \"traction_t\" }\nhalf = { combine = { tau = 0.5 } }\n => ",
     ]);
     let slip = DRIVER.replace("mu_p", "mu_q");
-    let refused: &[(&str, &str, &[&str], &str)] = &[
-        (
-            "joint.toml",
-            DRIVER,
-            &["--max-increments", "0"],
-            "at least 1",
-        ),
-        ("joint.toml", DRIVER, &["--variant", "rough"], "no variant"),
-        (
-            "joint.toml",
-            DRIVER,
-            &["--interface-stiffness"],
-            "needs a case",
-        ),
-        ("joint.toml", &slip, &[], "no parameter `mu_q`"),
-        ("case.toml", &no_probes, &[], "there are no [probes]"),
-        (
-            "case.toml",
-            &edited(&[]),
-            &["--interface-stiffness"],
-            "zero_thickness",
-        ),
-    ];
-    for (file, text, more, says) in refused {
-        let outcome = study(&place, file, text, more);
-        assert_eq!(outcome.code, Some(BAD_INPUT), "{says}: {}", outcome.stderr);
+    let refused = |file: &str, text: &str, more: &str, says: &str| {
+        let outcome = study(&place, file, text, &words(more)).ended(BAD_INPUT);
         outcome.shows(says);
         assert_eq!(outcome.stdout, "");
-    }
+    };
+    refused("joint.toml", DRIVER, "--max-increments 0", "at least 1");
+    refused("joint.toml", DRIVER, "--variant rough", "no variant");
+    refused(
+        "joint.toml",
+        DRIVER,
+        "--interface-stiffness",
+        "needs a case",
+    );
+    refused("joint.toml", &slip, "", "no parameter `mu_q`");
+    refused("case.toml", &no_probes, "", "there are no [probes]");
+    refused(
+        "case.toml",
+        &edited(&[]),
+        "--interface-stiffness",
+        "zero_thickness",
+    );
     place.refused(&["trade-off", "nothing.toml"]);
 }
 

@@ -5,6 +5,7 @@ use crate::program::{BAD_INPUT, CASE, DONE, PLUGIN_TROUBLE, Place};
 use crate::troubled;
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::path::{Path, PathBuf};
+use tests::or_skip;
 use tests::words::rows_of;
 
 /// Where cargo puts the law libraries.
@@ -89,9 +90,7 @@ fn a_lock_beside_a_case_is_honoured() {
 
 #[test]
 fn a_driver_has_a_lock_too() {
-    let Some(place) = troubled::place("") else {
-        return;
-    };
+    let place = or_skip!(troubled::place(""));
     place.write(
         "driver.toml",
         troubled::driver("cut").replace("limit = 1.0e-3", "limit = 1.0"),
@@ -118,18 +117,12 @@ TROUBLE_FROM_START=ABORT | signal 6 (aborted), while calling law `troubled` unde
 TROUBLE_FROM_START=EXIT | exit code 0, while calling law `troubled`
 ",
     ) {
-        let Some(place) = troubled::place(define) else {
-            return;
-        };
+        let place = or_skip!(troubled::place(define));
         place.write("driver.toml", troubled::driver("cut"));
-        let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
-        assert_eq!(
-            outcome.code,
-            Some(PLUGIN_TROUBLE),
-            "{define}: {}",
-            outcome.stderr
-        );
-        assert!(outcome.says(says), "{define}: {}", outcome.stderr);
+        let outcome = place
+            .run(&["point", "driver.toml", "--csv", "out.csv"])
+            .ended(PLUGIN_TROUBLE);
+        outcome.shows(says);
         outcome.shows(troubled::library());
     }
 }
@@ -137,9 +130,7 @@ TROUBLE_FROM_START=EXIT | exit code 0, while calling law `troubled`
 #[test]
 #[cfg(unix)]
 fn without_a_probe_a_library_that_crashes_is_named() {
-    let Some(place) = troubled::place("TROUBLE_AT_ENTRY") else {
-        return;
-    };
+    let place = or_skip!(troubled::place("TROUBLE_AT_ENTRY"));
     place.write("driver.toml", troubled::driver("cut"));
     let outcome = place
         .run(&["point", "driver.toml", "--csv", "out.csv", "--no-probe"])
@@ -151,9 +142,7 @@ fn without_a_probe_a_library_that_crashes_is_named() {
 #[cfg(unix)]
 fn libraries_that_everybody_may_change_are_refused() {
     use std::os::unix::fs::PermissionsExt;
-    let Some(place) = troubled::place("") else {
-        return;
-    };
+    let place = or_skip!(troubled::place(""));
     place.write(
         "driver.toml",
         troubled::driver("cut").replace("limit = 1.0e-3", "limit = 1.0"),
@@ -186,9 +175,7 @@ fn libraries_that_everybody_may_change_are_refused() {
 /// The library would crash if anything of it ran.
 #[test]
 fn inspection_runs_nothing() {
-    let Some(place) = troubled::place("TROUBLE_AT_ENTRY") else {
-        return;
-    };
+    let place = or_skip!(troubled::place("TROUBLE_AT_ENTRY"));
     let library = troubled::library();
     let outcome = place.done(&["inspect", &library, "--json"]);
     let found: serde_json::Value = serde_json::from_str(&outcome.stdout).unwrap();

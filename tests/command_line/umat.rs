@@ -26,6 +26,7 @@ use std::process::{Command, Output};
 use std::sync::{Mutex, PoisonError};
 use tempfile::TempDir;
 use tests::case::table;
+use tests::or_skip;
 use tests::words;
 
 /// A folder with a routine and its sidecar. `None`, with a remark, where there is no compiler.
@@ -133,9 +134,7 @@ fn last(place: &Place) -> Vec<f64> {
 
 #[test]
 fn an_elastic_umat_is_the_elastic_law() {
-    let Some(place) = place("elastic") else {
-        return;
-    };
+    let place = or_skip!(place("elastic"));
     place.done_case(CASE);
     let ours = last(&place);
     let mut all = Vec::new();
@@ -152,9 +151,7 @@ fn an_elastic_umat_is_the_elastic_law() {
 
 #[test]
 fn the_adapter_gives_the_bits_of_a_direct_call() {
-    let Some(place) = place("drucker_prager") else {
-        return;
-    };
+    let place = or_skip!(place("drucker_prager"));
     let program = place.path("direct");
     let sources = [source("direct.f"), source("drucker_prager.f")];
     gfortran(&[], &sources, &program).unwrap();
@@ -183,9 +180,7 @@ fn the_adapter_gives_the_bits_of_a_direct_call() {
 
 #[test]
 fn a_cone_ends_at_its_strength_in_triaxial_compression() {
-    let Some(place) = place("drucker_prager") else {
-        return;
-    };
+    let place = or_skip!(place("drucker_prager"));
     let text = driver("drucker_prager", "", "alpha = 0.4\nbeta = 0.1\nk = 10.0");
     let start = text.find("[[segment]]").unwrap();
     let text = text[..start].replacen("plane_strain", "axisymmetric", 1)
@@ -207,9 +202,7 @@ fn a_cone_ends_at_its_strength_in_triaxial_compression() {
 
 #[test]
 fn a_soil_that_flows_converges_with_the_tangent_of_its_routine() {
-    let Some(place) = place("drucker_prager") else {
-        return;
-    };
+    let place = or_skip!(place("drucker_prager"));
     let probe = r#"[solver] => flow = { group = "soil", quantity = "multiplier" }\n\n[solver]"#;
     let text = words::edited(&flowing("drucker_prager"), &[probe]);
     place.done_case(text);
@@ -222,9 +215,7 @@ fn a_soil_that_flows_converges_with_the_tangent_of_its_routine() {
 
 #[test]
 fn arguments_are_true() {
-    let Some(place) = place("echo") else {
-        return;
-    };
+    let place = or_skip!(place("echo"));
     let text = driver("echo", "", "").replacen("plane_strain", "axisymmetric", 1)
         + "[[segment]]\nincrements = 3\ncontrol = { 11 = { strain = 1e-3 }, \
            22 = { strain = -2e-3 }, 33 = { strain = 0.0 }, 12 = { strain = 1e-3 } }\n";
@@ -259,9 +250,7 @@ fn arguments_are_true() {
 
 #[test]
 fn elements_say_where_they_are() {
-    let Some(place) = place("echo") else {
-        return;
-    };
+    let place = or_skip!(place("echo"));
     let text = soil("echo", "").replacen("profile = \"phases\"", "points = \"phases\"", 1);
     place.done_case(text);
     let rows = table(&place.path("out/points.csv"));
@@ -291,9 +280,7 @@ fn elements_say_where_they_are() {
 
 #[test]
 fn a_routine_that_asks_for_smaller_steps_gets_them() {
-    let Some(place) = place("smaller") else {
-        return;
-    };
+    let place = or_skip!(place("smaller"));
     let text = driver("smaller", "", "largest = 3e-5");
     place.write("driver.toml", &text);
     let outcome = place.done(&["point", "driver.toml", "--csv", "out.csv"]);
@@ -320,9 +307,7 @@ fn each_material_has_variables_of_its_own() {
 }
 
 fn has_variables_of_its_own(name: &str) {
-    let Some(place) = place(name) else {
-        return;
-    };
+    let place = or_skip!(place(name));
     let edits: &[&str] = &[
         "[groups.soil] => [laws.hard]\nlaw = \"umat_saves\"\nadapter = \"umat\"\n\
             library = \"libsaves.so\"\nKEYS\nparameters = { young_modulus = 3e4, \
@@ -349,9 +334,7 @@ fn has_variables_of_its_own(name: &str) {
 
 #[test]
 fn a_zone_has_no_two_variables_of_one_name() {
-    let Some(place) = place("elastic") else {
-        return;
-    };
+    let place = or_skip!(place("elastic"));
     let sidecar = place.read("elastic.law.toml");
     let variable = "[[internal]]\nid = \"zone_stress_11\"\nunit = \"kPa\"\ndoc = \"a stress\"\n";
     place.write("elastic.law.toml", format!("{sidecar}\n{variable}"));
@@ -367,9 +350,7 @@ fn a_zone_has_no_two_variables_of_one_name() {
 
 #[test]
 fn six_components_stand_for_four_only_where_that_is_declared() {
-    let Some(place) = place("six") else {
-        return;
-    };
+    let place = or_skip!(place("six"));
     let stress = |rows: &[BTreeMap<String, String>]| {
         ["11", "22", "33", "12"].map(|c| number(rows.last().unwrap(), &format!("stress_{c}")))
     };
@@ -400,9 +381,7 @@ fn six_components_stand_for_four_only_where_that_is_declared() {
 
 #[test]
 fn an_interface_with_two_components() {
-    let Some(place) = place("joint") else {
-        return;
-    };
+    let place = or_skip!(place("joint"));
     let case = edited(&[
         "law = \"coulomb_joint\"\n[laws.joint.parameters]\nnormal_stiffness = 1e6\n\
             shear_stiffness = 4e5\ncohesion = 10.0\nfriction_angle = 30.0\n\
@@ -427,9 +406,7 @@ fn an_interface_with_two_components() {
 
 #[test]
 fn utility_routines_are_there() {
-    let Some(place) = place("utilities") else {
-        return;
-    };
+    let place = or_skip!(place("utilities"));
     for keys in ["", "in_process = true"] {
         let rows = rows(&place, &driver("utilities", keys, ""));
         let end = rows.last().unwrap();

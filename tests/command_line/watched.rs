@@ -4,18 +4,18 @@
 use crate::program::{CASE, DONE, PLUGIN_TROUBLE, Place};
 use crate::troubled;
 use std::process::Command;
+use tests::or_skip;
 
 /// A program that does not care for its children passes that on to them.
 #[test]
 fn ends_of_children_are_told_whoever_started_the_program() {
-    let Some(place) = troubled::place("") else {
-        return;
-    };
+    let place = or_skip!(troubled::place(""));
     let careless = "exec env --ignore-signal=CHLD \"$0\" \"$@\"";
     for (how, code) in [("locale", DONE), ("segfault", PLUGIN_TROUBLE)] {
         place.write("case.toml", troubled::case(how));
-        let outcome = place.run_limited(careless, &["run", "case.toml", "--out", how]);
-        assert_eq!(outcome.code, Some(code), "{how}: {}", outcome.stderr);
+        place
+            .run_limited(careless, &["run", "case.toml", "--out", how])
+            .ended(code);
     }
 }
 
@@ -33,9 +33,7 @@ fn a_program_that_has_threads_already_is_not_watched() {
     let [source, library] = ["thread.c", "thread.so"].map(|name| place.path(name));
     let mut compiler = Command::new("cc");
     compiler.args(["-shared", "-fPIC", "-pthread", "-o"]);
-    let Some(output) = tests::needs::output(compiler.arg(&library).arg(&source)) else {
-        return;
-    };
+    let output = or_skip!(tests::needs::output(compiler.arg(&library).arg(&source)));
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{said}");
     let run = ["run", "case.toml", "--out", "out"];

@@ -5,6 +5,7 @@ use crate::program::{
     check, compiled, compiled_with, folder, library_of, pilum, pilum_in, refused,
 };
 use std::path::Path;
+use tests::or_skip;
 use tests::words::has;
 use tests::words::rows_of;
 
@@ -30,9 +31,7 @@ fn driver(folder: &Path, more: &str) -> String {
 #[test]
 fn a_driver_is_what_the_checks_are_made_with() {
     let folder = folder();
-    let Some(library) = compiled_with(SOFT, "fixture", folder.path()) else {
-        return;
-    };
+    let library = or_skip!(compiled_with(SOFT, "fixture", folder.path()));
     assert_eq!(check(&library, &[]).code, Some(0));
     let more = "[[segment]]\nincrements = 3\n\
                 control = { n = { traction = -40.0 } }\n\
@@ -60,18 +59,14 @@ fn a_driver_is_what_the_checks_are_made_with() {
 #[test]
 fn a_driver_that_does_not_fit_is_bad_input() {
     let folder = folder();
-    let Some(library) = compiled_with("", "fixture", folder.path()) else {
-        return;
-    };
+    let library = or_skip!(compiled_with("", "fixture", folder.path()));
     let library = library.to_str().unwrap();
     let refused = |library: &str, driver: &str| refused(&["check", library, "--driver", driver], 1);
     assert!(refused(library, "no/such.toml").contains("cannot read no/such.toml"));
     let wrong = driver(folder.path(), "figur = []\n");
     let words = refused(library, &wrong);
-    assert!(
-        words.contains("figur") && words.contains("driver.toml:12:"),
-        "{words}"
-    );
+    has(&words, "figur");
+    has(&words, "driver.toml:12:");
     let right = driver(folder.path(), "");
     let words = refused(library_of("elastic").to_str().unwrap(), &right);
     assert!(words.contains("leads `fixture` of library"), "{words}");
@@ -81,9 +76,7 @@ fn a_driver_that_does_not_fit_is_bad_input() {
 #[test]
 fn a_wrong_call_can_be_repeated() {
     let folder = folder();
-    let Some(library) = compiled("bad_tangent", folder.path()) else {
-        return;
-    };
+    let library = or_skip!(compiled("bad_tangent", folder.path()));
     let id = "tangent-matches-differences";
     let report = check(&library, &["--only", id]);
     let capsule = report.check(id)["capsule"].as_str().unwrap();
@@ -126,9 +119,7 @@ fn a_doubtful_call_can_be_repeated() {
         ("bad_engineering_shear", "response-is-isotropic"),
     ] {
         let folder = folder();
-        let Some(library) = compiled(fixture, folder.path()) else {
-            return;
-        };
+        let library = or_skip!(compiled(fixture, folder.path()));
         let report = check(&library, &["--only", id]);
         let capsule = report.check(id)["capsule"].as_str().unwrap();
         let output = pilum(&["replay", capsule]);
@@ -165,17 +156,9 @@ bad_overread | reads-stay-inside | fluxes | the law crashed: signal 11 (segmenta
 bad_long_array | independent-of-split | fluxes | the law crashed: signal 11 (segmentation fault)
 ",
     ) {
-        let Some((capsule, said)) = replayed(fixture, id) else {
-            return;
-        };
-        assert!(
-            capsule.contains(&format!("request = \"{request}")),
-            "{fixture}: {capsule}"
-        );
-        assert!(
-            said.contains(&format!("as recorded: `internal`: {says}")),
-            "{fixture}: {said}"
-        );
+        let (capsule, said) = or_skip!(replayed(fixture, id));
+        has(&capsule, format!("request = \"{request}"));
+        has(&said, format!("as recorded: `internal`: {says}"));
         let n_points = capsule.matches("[[point]]").count();
         assert_eq!(
             n_points > 0,
@@ -227,9 +210,7 @@ fn a_crash_where_no_law_is_called_can_be_repeated() {
         };
         let definitions = &row[1].replace("\\n", "\n");
         let folder = folder();
-        let Some(library) = compiled_with(definitions, name, folder.path()) else {
-            return;
-        };
+        let library = or_skip!(compiled_with(definitions, name, folder.path()));
         let report = check(&library, &["--only", id, "--time-limit", "2"]);
         assert_eq!(report.check(id)["outcome"], "crashed", "{name}");
         let capsule = report.check(id)["capsule"].as_str();
@@ -237,26 +218,14 @@ fn a_crash_where_no_law_is_called_can_be_repeated() {
         let text = std::fs::read_to_string(capsule).unwrap();
         let is_of_law = text.contains("[probe]");
         let key = if is_of_law { "function" } else { "phase" };
-        assert!(
-            text.contains(&format!("{key} = \"{phase}\"")),
-            "{name}: {text}"
-        );
+        has(&text, format!("{key} = \"{phase}\""));
         let sha256 = report.json["sha256"].as_str().unwrap();
-        assert!(
-            text.contains(&format!("sha256 = \"{sha256}\"")),
-            "{name}: {text}"
-        );
+        has(&text, format!("sha256 = \"{sha256}\""));
         let output = pilum(&["replay", capsule]);
         let said = String::from_utf8(output.stdout).unwrap();
         assert_eq!(output.status.code(), Some(3), "{name}: {said}");
-        assert!(
-            said.contains(&format!("as recorded: `internal`: {says}")),
-            "{name}: {said}"
-        );
-        assert!(
-            said.contains(&format!("from check {id}, seed 1")),
-            "{name}: {said}"
-        );
+        has(&said, format!("as recorded: `internal`: {says}"));
+        has(&said, format!("from check {id}, seed 1"));
         // Mended, it is another library, and nothing fails.
         compiled_with("", name, folder.path()).unwrap();
         let output = pilum(&["replay", capsule]);
@@ -294,9 +263,7 @@ destructor | phase = "exit" | the library crashed: signal 6
         );
         let visible = "#pragma GCC visibility push(default)\n";
         std::fs::write(&source, format!("{visible}{text}{more}")).unwrap();
-        let Some(library) = crate::program::compiled_from(&source, &umat, folder.path()) else {
-            return;
-        };
+        let library = or_skip!(crate::program::compiled_from(&source, &umat, folder.path()));
         let sidecar = library.with_extension("law.toml");
         std::fs::copy(umat.join("rows.law.toml"), sidecar).unwrap();
         let id = "routine-answers";
@@ -309,10 +276,7 @@ destructor | phase = "exit" | the library crashed: signal 6
         let output = pilum(&["replay", capsule]);
         let said = String::from_utf8(output.stdout).unwrap();
         assert_eq!(output.status.code(), Some(3), "{attribute}: {said}");
-        assert!(
-            said.contains(&format!("as recorded: `internal`: {says}")),
-            "{attribute}: {said}"
-        );
+        has(&said, format!("as recorded: `internal`: {says}"));
     }
 }
 
@@ -346,13 +310,8 @@ bad_init_random | repeatable | ; called again: flux
 bad_init_split | independent-of-split | ; alone: flux
 ",
     ) {
-        let Some((capsule, said)) = replayed(fixture, id) else {
-            return;
-        };
-        assert!(
-            capsule.contains("request = \"initial state\""),
-            "{fixture}: {capsule}"
-        );
+        let (capsule, said) = or_skip!(replayed(fixture, id));
+        has(&capsule, "request = \"initial state\"");
         assert!(said.contains(says), "{fixture}: {said}");
     }
 }
@@ -360,9 +319,7 @@ bad_init_split | independent-of-split | ; alone: flux
 #[test]
 fn what_has_passed_need_not_be_read() {
     let folder = folder();
-    let Some(library) = compiled("bad_print", folder.path()) else {
-        return;
-    };
+    let library = or_skip!(compiled("bad_print", folder.path()));
     let library = library.to_str().unwrap();
     let all = pilum_in(folder.path(), &["check", library]);
     let failed = pilum_in(folder.path(), &["check", library, "--only-failed"]);
@@ -382,9 +339,7 @@ fn what_has_passed_need_not_be_read() {
 #[test]
 fn a_check_can_be_run_under_a_debugger() {
     let folder = folder();
-    let Some(library) = compiled("bad_abort", folder.path()) else {
-        return;
-    };
+    let library = or_skip!(compiled("bad_abort", folder.path()));
     let only = |id: &str| {
         let library = library.to_str().unwrap();
         pilum(&["check", library, "--in-process", "--only", id])
@@ -402,10 +357,11 @@ fn a_check_can_be_run_under_a_debugger() {
 fn a_sidecar_that_cannot_be_read_is_told_with_its_line() {
     let umat = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/umat");
     let folder = folder();
-    let Some(library) = crate::program::compiled_from(&umat.join("rows.c"), &umat, folder.path())
-    else {
-        return;
-    };
+    let library = or_skip!(crate::program::compiled_from(
+        &umat.join("rows.c"),
+        &umat,
+        folder.path()
+    ));
     let good = std::fs::read_to_string(umat.join("rows.law.toml")).unwrap();
     let sidecar = library.with_extension("law.toml");
     let wrong = format!("{good}\n[[state]]\nid = \"slip\"\n");
@@ -429,9 +385,7 @@ fn a_sidecar_that_cannot_be_read_is_told_with_its_line() {
 #[test]
 fn a_program_whose_file_is_gone_goes_on() {
     let folder = folder();
-    let Some(library) = compiled_with(SOFT, "fixture", folder.path()) else {
-        return;
-    };
+    let library = or_skip!(compiled_with(SOFT, "fixture", folder.path()));
     let script = "cp \"$0\" gone && exec 3< gone && rm gone && exec /proc/self/fd/3 check \"$1\" --only repeatable";
     let output = std::process::Command::new("sh")
         .args(["-c", script])
@@ -450,9 +404,7 @@ fn a_law_that_gave_up_in_an_earlier_call_fails() {
     const GIVES_UP: &str = "static int gave_up;\n#define IN_INTEGRATE gave_up = 1\n\
                             #define AT_INIT if (gave_up) return PILUM_E_INTERNAL; travel = 0.0";
     let folder = folder();
-    let Some(library) = compiled_with(GIVES_UP, "fixture", folder.path()) else {
-        return;
-    };
+    let library = or_skip!(compiled_with(GIVES_UP, "fixture", folder.path()));
     let id = "results-are-finite";
     let report = check(&library, &["--only", id]);
     assert_eq!(report.with(&["failed"]), [id], "{:#}", report.json);
@@ -469,9 +421,7 @@ fn the_first_words_of_a_law_that_gives_up_are_kept() {
                           if (travel > 1e-4) { panicked = 1; TELL(PILUM_E_INTERNAL, i); \
                           SAY(\"point %d: panicked: index 7 of 5\", (int)i); return PILUM_E_INTERNAL; }";
     let folder = folder();
-    let Some(library) = compiled_with(PANICS, "fixture", folder.path()) else {
-        return;
-    };
+    let library = or_skip!(compiled_with(PANICS, "fixture", folder.path()));
     let id = "results-are-finite";
     let report = check(&library, &["--only", id]);
     assert_eq!(report.with(&["failed"]), [id], "{:#}", report.json);

@@ -7,8 +7,10 @@ use crate::program::{Report, check, compiled, compiled_with, folder, library_of,
 use gallery::{CRASHED, GALLERY, REFUSED, WARNED};
 use std::hint::black_box;
 use std::path::Path;
+use tests::or_skip;
 use tests::words::has;
 use tests::words::rows_of;
+use tests::words::words as listed;
 
 /// The one check that fails is this one, of those that were made, and says how to repeat it.
 fn fails(report: &Report, library: &Path, id: &str, outcome: &str) {
@@ -58,20 +60,18 @@ fn point_refuses(library: &Path, folder: &Path) {
 fn every_bad_library_fails_the_check_that_names_its_fault() {
     for (fixture, id) in GALLERY {
         let folder = folder();
-        let Some(library) = compiled(fixture, folder.path()) else {
-            return;
-        };
+        let library = or_skip!(compiled(fixture, folder.path()));
         // An endless loop has to be waited for.
         let limit = if fixture == "bad_loop" { "1" } else { "30" };
         let report = check(&library, &["--only", id, "--time-limit", limit]);
-        let crashes = CRASHED.contains(&fixture);
+        let crashes = listed(CRASHED).contains(&fixture);
         fails(
             &report,
             &library,
             id,
             if crashes { "crashed" } else { "failed" },
         );
-        if REFUSED.contains(&fixture) {
+        if listed(REFUSED).contains(&fixture) {
             point_refuses(&library, folder.path());
         }
     }
@@ -81,9 +81,7 @@ fn every_bad_library_fails_the_check_that_names_its_fault() {
 fn what_may_be_meant_is_a_warning_of_the_check_that_names_it() {
     for (fixture, id) in WARNED {
         let folder = folder();
-        let Some(library) = compiled(fixture, folder.path()) else {
-            return;
-        };
+        let library = or_skip!(compiled(fixture, folder.path()));
         let report = check(&library, &["--only", id]);
         assert_eq!(report.check(id)["outcome"], "warning", "{fixture}");
         assert_eq!(report.code, Some(0), "{fixture}: {}", report.stderr);
@@ -94,9 +92,7 @@ fn what_may_be_meant_is_a_warning_of_the_check_that_names_it() {
 #[test]
 fn warnings_count_where_that_is_asked_for() {
     let folder = folder();
-    let Some(library) = compiled("bad_unit", folder.path()) else {
-        return;
-    };
+    let library = or_skip!(compiled("bad_unit", folder.path()));
     let only = "--only=units-are-known";
     let report = check(&library, &[only, "--strict", "--only-failed"]);
     assert_eq!(report.code, Some(3), "{}", report.stderr);
@@ -119,9 +115,7 @@ bad_first_instance | independent-of-first-instance | as the first instance of a 
 ",
     ) {
         let folder = folder();
-        let Some(library) = compiled(fixture, folder.path()) else {
-            return;
-        };
+        let library = or_skip!(compiled(fixture, folder.path()));
         let report = check(&library, &["--only", id]);
         let details = report.check(id)["details"].as_str().unwrap();
         assert!(details.contains(says), "{details}");
@@ -132,9 +126,7 @@ bad_first_instance | independent-of-first-instance | as the first instance of a 
 #[test]
 fn a_library_that_flushes_subnormal_numbers_leaves_the_program_alone() {
     let folder = folder();
-    let Some(library) = compiled("bad_fast_math", folder.path()) else {
-        return;
-    };
+    let library = or_skip!(compiled("bad_fast_math", folder.path()));
     law::Opener::default().open(&library).unwrap();
     let subnormal = black_box(f64::MIN_POSITIVE) * black_box(0.5);
     assert_eq!(subnormal.to_bits(), 1 << 51);
@@ -169,12 +161,12 @@ fn every_fixture_is_in_the_gallery() {
         .filter(|name| name.starts_with("bad_"))
         .collect();
     let failing = GALLERY.map(|(fixture, _)| fixture);
-    let mut special = CRASHED.iter().chain(&REFUSED);
-    assert!(special.all(|fixture| failing.contains(fixture)));
-    let mut listed = [&failing[..], &WARNED.map(|(fixture, _)| fixture)].concat();
+    let mut special = listed(CRASHED).into_iter().chain(listed(REFUSED));
+    assert!(special.all(|fixture| failing.contains(&fixture)));
+    let mut known = [&failing[..], &WARNED.map(|(fixture, _)| fixture)].concat();
     there.sort();
-    listed.sort_unstable();
-    assert_eq!(there, listed);
+    known.sort_unstable();
+    assert_eq!(there, known);
 }
 
 #[test]
@@ -212,9 +204,7 @@ integrate_soft | integrate-works | #define STIFFNESS(row, column) (0.0 * instanc
 step_unknown | integrate-works | #define AT_END if (increment[1] > 0.0) { TELL(42, i); worst = 42; continue; } | a small step gave X
 ",
     ) {
-        let Some(library) = compiled_with(definitions, name, folder.path()) else {
-            return;
-        };
+        let library = or_skip!(compiled_with(definitions, name, folder.path()));
         let report = check(&library, &["--only", id]);
         fails(&report, &library, id, "failed");
         let details = report.check(id)["details"].as_str().unwrap();
@@ -263,9 +253,7 @@ pulled | integrate-works | STARTS <= 0.0 | a tension of 100 kPa is: compression 
             Some(("STARTS", refused)) => starts(refused),
             Some(_) => definitions.to_owned(),
         };
-        let Some(details) = details(&definitions, name, id) else {
-            return;
-        };
+        let details = or_skip!(details(&definitions, name, id));
         assert!(details.contains(says), "{name}: {details}");
     }
 }
@@ -313,9 +301,7 @@ fn a_reference_of_one_unit_is_settled_by_a_parameter_or_a_sentence() {
         ),
     ] {
         let folder = folder();
-        let Some(library) = compiled_with(&definitions, name, folder.path()) else {
-            return;
-        };
+        let library = or_skip!(compiled_with(&definitions, name, folder.path()));
         let report = check(&library, &["--only", id]);
         let finding = report.check(id);
         assert_eq!(finding["outcome"], outcome, "{name}: {finding:#}");
@@ -329,9 +315,7 @@ fn a_wrong_tangent_is_told_by_row_and_column_with_both_values() {
     let folder = folder();
     let tangent = "#define TANGENT(row, column) \
                    (STIFFNESS(row, column) + (row == 1 && column == 0 ? 5e4 : 0.0))";
-    let Some(library) = compiled_with(tangent, "off_diagonal", folder.path()) else {
-        return;
-    };
+    let library = or_skip!(compiled_with(tangent, "off_diagonal", folder.path()));
     let id = "tangent-matches-differences";
     let stiff = "normal_stiffness=1e6";
     let report = check(&library, &["--only", id, "--set", stiff]);
@@ -346,9 +330,7 @@ fn a_wrong_tangent_is_told_by_row_and_column_with_both_values() {
 #[test]
 fn a_library_that_crashes_is_no_bad_setting() {
     let folder = folder();
-    let Some(library) = compiled("bad_create_abort", folder.path()) else {
-        return;
-    };
+    let library = or_skip!(compiled("bad_create_abort", folder.path()));
     let more = ["--only=create-works", "--set", "normal_stiffness=1e6"];
     fails(&check(&library, &more), &library, "create-works", "crashed");
 }
@@ -377,10 +359,7 @@ supports = [{ line = "bottom", fixed = ["x", "y"] }]
 columns = [{ n = 1, to = 1.0 }]
 rows = [{ n = 2, to = 1.0 }]
 region = [{ group = "soil" }]
-[mesh.lines]
-bottom = { y = 0.0 }
-top = { y = 1.0 }
-middle = { y = 0.5 }
+lines = { bottom = { y = 0.0 }, top = { y = 1.0 }, middle = { y = 0.5 } }
 [laws.soil]
 law = "elastic"
 parameters = { young_modulus = 1e4, poisson_ratio = 0.3 }
@@ -438,15 +417,8 @@ fn what_a_law_prints_hides_nothing() {
     let folder = folder();
     let prints = "#define IN_INTEGRATE static int calls; if (calls++ == 0) \
                   for (int k = 0; k < 1 << 21; k++) putchar(k % 64 ? 'x' : '\\n')";
-    let Some(library) = compiled_with(prints, "prints_much", folder.path()) else {
-        return;
-    };
-    let only = [
-        "--only",
-        "empty-batch-is-accepted",
-        "--only",
-        "prints-nothing",
-    ];
+    let library = or_skip!(compiled_with(prints, "prints_much", folder.path()));
+    let only = listed("--only empty-batch-is-accepted --only prints-nothing");
     let report = check(&library, &only);
     assert_eq!(report.with(&["passed"]), ["empty-batch-is-accepted"]);
     fails(&report, &library, "prints-nothing", "failed");
@@ -455,9 +427,7 @@ fn what_a_law_prints_hides_nothing() {
 #[test]
 fn the_command_of_a_failure_repeats_it() {
     let folder = folder();
-    let Some(library) = compiled("bad_tangent", folder.path()) else {
-        return;
-    };
+    let library = or_skip!(compiled("bad_tangent", folder.path()));
     let report = check(&library, &["--seed", "7"]);
     let failure = report.check("tangent-matches-differences");
     let replay = failure["replay"].as_str().unwrap();

@@ -9,6 +9,7 @@ use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use tests::needs::{compiler, output};
+use tests::words::words;
 
 /// Builds a law of `models/foreign`. `None`, with a remark, where there is no compiler.
 fn foreign(source: &str, folder: &Path) -> Option<PathBuf> {
@@ -42,13 +43,9 @@ fn foreign(source: &str, folder: &Path) -> Option<PathBuf> {
 
 #[test]
 fn laws_in_other_languages_pass() {
-    for source in [
-        "coulomb_joint.c",
-        "coulomb_joint.cpp",
-        "coulomb_joint.f90",
-        "cam_clay.cpp",
-        "cam_clay.f90",
-    ] {
+    for source in
+        words("coulomb_joint.c coulomb_joint.cpp coulomb_joint.f90 cam_clay.cpp cam_clay.f90")
+    {
         let folder = folder();
         if let Some(library) = foreign(source, folder.path()) {
             // A Fortran library has no manifest, which says nothing of the law.

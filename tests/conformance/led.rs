@@ -3,6 +3,7 @@
 
 use crate::program::{Report, check, compiled_from, folder, library_of, refused};
 use std::path::{Path, PathBuf};
+use tests::or_skip;
 use tests::words::has;
 
 /// A routine in C, compiled in this folder. `None`, with a remark, where there is no compiler.
@@ -42,9 +43,7 @@ fn details(report: &Report, id: &str) -> (String, String) {
 #[test]
 fn a_umat_is_led_by_a_driver() {
     let folder = folder();
-    let Some(library) = routine("umat", "rows", folder.path()) else {
-        return;
-    };
+    let library = or_skip!(routine("umat", "rows", folder.path()));
     let sidecar = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/umat/rows.law.toml");
     let text = std::fs::read_to_string(sidecar).unwrap();
     let head = "law = \"umat_rows\"\nadapter = \"umat\"\nlibrary = \"librows.so\"\nsidecar = \"mine.law.toml\"\n";
@@ -86,14 +85,10 @@ fn a_umat_is_led_by_a_driver() {
 #[test]
 fn a_udsm_is_led_by_a_driver_alone() {
     let folder = folder();
-    let Some(library) = routine("udsm", "skew", folder.path()) else {
-        return;
-    };
+    let library = or_skip!(routine("udsm", "skew", folder.path()));
     let words = refused(&["check", library.to_str().unwrap()], 1);
-    assert!(
-        words.contains("is a UDSM of PLAXIS") && words.contains("`--driver FILE`"),
-        "{words}"
-    );
+    has(&words, "is a UDSM of PLAXIS");
+    has(&words, "`--driver FILE`");
     let led = |order: &str, wrong: &str| {
         let head =
             format!("law = \"model_1\"\nadapter = \"udsm\"\nlibrary = \"libskew.so\"\n{order}");
@@ -136,10 +131,8 @@ fn a_udsm_is_led_by_a_driver_alone() {
             "{wrong}"
         );
         let (_, said) = details(&report, "routine-answers");
-        assert!(
-            said.contains("no increment was done") && said.contains(says),
-            "{said}"
-        );
+        has(&said, "no increment was done");
+        has(&said, says);
     }
 }
 

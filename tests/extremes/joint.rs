@@ -7,6 +7,7 @@ use crate::matrix::{Family, Verdict};
 use crate::point::{Point, Response, law, reason};
 use crate::wide::{Wide, sin_cos, wide};
 use abi::Hypothesis;
+use tests::words::paths_of;
 
 #[derive(Clone, Copy, Debug)]
 struct Joint {
@@ -200,35 +201,17 @@ pub(crate) fn near(what: &str, found: f64, expected: f64, tolerance: f64) -> Res
 }
 
 /// Opening and slip of each increment, in units of the strength over the stiffnesses.
-const PATHS: [(&str, &[[f64; 2]]); 5] = [
-    ("shear", &[[0.0, 0.5], [0.0, 1.0], [0.0, -3.0], [0.0, 2.0]]),
-    (
-        "zero and back",
-        &[
-            [-1.0, 0.2],
-            [0.9, 0.2],
-            [0.2, 0.1],
-            [3.0, 1.0],
-            [-2.0, 0.3],
-            [-3.0, 1.0],
-        ],
-    ),
-    ("opens sliding", &[[0.5, 1.5], [2.0, 1.5], [-9.0, 2.0]]),
-    ("compression", &[[-1.0, 0.0], [-10.0, 5.0], [-1e3, -1e3]]),
-    (
-        "barely open",
-        &[
-            [1.0, 0.0],
-            [1e-9, 1e-9],
-            [-1e-9, 0.1],
-            [-1e-6, 1.0],
-            [-1.0, 1.0],
-        ],
-    ),
-];
+const PATHS: &str = "
+shear | 0 0.5; 0 1; 0 -3; 0 2
+zero and back | -1 0.2; 0.9 0.2; 0.2 0.1; 3 1; -2 0.3; -3 1
+opens sliding | 0.5 1.5; 2 1.5; -9 2
+compression | -1 0; -10 5; -1e3 -1e3
+barely open | 1 0; 1e-9 1e-9; -1e-9 0.1; -1e-6 1; -1 1
+";
 
 pub(crate) fn families() -> Vec<Family> {
     let mut family = Family::new("Coulomb joint", "cases and events, double-double");
+    let paths = paths_of(PATHS);
     let angles = [
         0.0,
         1e-9,
@@ -259,7 +242,7 @@ pub(crate) fn families() -> Vec<Family> {
                         psi: phi * share,
                         tensile: tension * apex,
                     };
-                    let (path, segments) = PATHS[(i + j + k + l) % 5];
+                    let (path, segments) = &paths[(i + j + k + l) % 5];
                     let scale = [1e-3, 1.0, 1e6][(i + 2 * j + k) % 3];
                     let verdict = follow(&joint, segments, scale);
                     family.add(format!("{joint:?}: {path} by {scale:e}"), verdict);

@@ -9,6 +9,7 @@ use crate::matrix::{Family, Verdict};
 use crate::mepi_step::{Mepi, Peak, State, check};
 use crate::point::{Point, law, reason};
 use abi::Hypothesis;
+use tests::words::paths_of;
 
 /// Table IV of De Gennaro & Frank, with the p_0 that makes it dilate.
 pub(crate) const TABLE_4: Mepi = Mepi {
@@ -175,39 +176,14 @@ fn state(flux: &[f64], state: &[f64]) -> State {
 }
 
 /// Paths in units of the elastic compression and of a slip: contraction and slip of each segment.
-const PATHS: [(&str, &[[f64; 2]]); 6] = [
-    ("constant volume", &[[0.0, 1.0]]),
-    ("compression and shear", &[[0.5, 1.0], [2.0, -1.0]]),
-    (
-        "reversals",
-        &[[0.0, 1.0], [0.0, -2.0], [0.0, 1.5], [0.0, -0.5]],
-    ),
-    (
-        "zero and back",
-        &[
-            [-0.9, 0.3],
-            [-1.0, 0.3],
-            [-1.0, 0.5],
-            [1.0, -0.5],
-            [2.5, 0.0],
-            [0.0, 1.0],
-        ],
-    ),
-    (
-        "opens at once",
-        &[[-3.0, 1.0], [4.0, -2.0], [-0.5, 1.0], [0.5, 1.0]],
-    ),
-    (
-        "barely open",
-        &[
-            [-1.0, 0.0],
-            [-1e-9, 0.1],
-            [1e-9, 0.0],
-            [1e-3, 1e-3],
-            [1.0, 1.0],
-        ],
-    ),
-];
+const PATHS: &str = "
+constant volume | 0 1
+compression and shear | 0.5 1; 2 -1
+reversals | 0 1; 0 -2; 0 1.5; 0 -0.5
+zero and back | -0.9 0.3; -1 0.3; -1 0.5; 1 -0.5; 2.5 0; 0 1
+opens at once | -3 1; 4 -2; -0.5 1; 0.5 1
+barely open | -1 0; -1e-9 0.1; 1e-9 0; 1e-3 1e-3; 1 1
+";
 
 fn follow(p: &Mepi, sigma_ni: f64, path: &[[f64; 2]], slip: f64, increments: u32) -> Verdict {
     let built = p.with_values(&[], |values| law(p.id(), Hypothesis::Interface2d, values));
@@ -250,6 +226,7 @@ pub(crate) fn families() -> Vec<Family> {
         ("Fontainebleau, published", published(FONTAINEBLEAU)),
         ("silica, published", published(SILICA)),
     ];
+    let paths = paths_of(PATHS);
     for (base, p) in bases {
         for (number, (what, p, sigma)) in extremes(p).into_iter().enumerate() {
             let constants = p.at(sigma);
@@ -257,7 +234,7 @@ pub(crate) fn families() -> Vec<Family> {
             let unit = constants.slip_scale
                 + p.mu_p * sigma / constants.k_t
                 + p.peak.map_or(0.0, |peak| peak.u_tp);
-            for (i, (path, segments)) in PATHS.into_iter().enumerate() {
+            for (i, (path, segments)) in paths.iter().enumerate() {
                 for (j, length) in [1e-2, 1.0, 1e4].into_iter().enumerate() {
                     // Half of all combinations, each length and path with one increment and more.
                     if (number + i + j) % 2 == 1 {
@@ -307,7 +284,7 @@ fn overflowing() -> Family {
             ];
             for (what, p) in changed {
                 let slip = p.mu_p * 100.0 / p.at(100.0).k_t;
-                for (path, segments) in &PATHS[..4] {
+                for (path, segments) in &paths_of(PATHS)[..4] {
                     let verdict = follow(&p, 100.0, segments, 2.0 * slip, 2);
                     family.add(format!("{what} = {value:e}: {path}"), verdict);
                 }

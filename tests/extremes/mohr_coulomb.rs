@@ -11,6 +11,7 @@ use crate::oriented::{lame, trial};
 use crate::point::{Point, Response, law, reason};
 use crate::wide::{Wide, eigen, sin_cos, sqrt, wide};
 use abi::Hypothesis;
+use tests::words::paths_of;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Parameters {
@@ -282,54 +283,30 @@ pub(crate) fn build(
         .map_err(|why| Verdict::Refused(reason(&why)))
 }
 
-/// Strains 11 22 33 12 13 23 in units of 100 kPa over a modulus.
-const PATHS: [(&str, &[[f64; 6]]); 5] = [
-    (
-        "triaxial",
-        &[
-            [0.3, -1.0, 0.3, 0.0, 0.0, 0.0],
-            [1.0, -2.0, 1.0, 0.0, 0.0, 0.0],
-            [-3.0, 5.0, -3.0, 0.0, 0.0, 0.0],
-        ],
-    ),
-    (
-        "shear",
-        &[
-            [0.0, 0.0, 0.0, 1.0, 0.2, -0.1],
-            [0.0, 0.0, 0.0, 2.0, 0.4, 0.3],
-            [0.0, 0.0, 0.0, -5.0, 0.0, 0.0],
-        ],
-    ),
-    (
-        "to the apex and back",
-        &[
-            [1.0, 1.1, 0.9, 0.01, 0.0, 0.0],
-            [0.5, 0.5, 0.5, 0.0, 0.0, 0.0],
-            [-2.0, -3.0, -2.0, 0.5, 0.1, 0.0],
-        ],
-    ),
-    (
-        "splitting",
-        &[
-            [2.0, 0.0, -0.5, 0.2, 0.0, 0.1],
-            [1.0, -3.0, 0.0, 0.0, 0.0, 0.0],
-            [-9.0, 0.0, 0.0, 1.0, 1.0, 1.0],
-        ],
-    ),
-    (
-        "compression",
-        &[
-            [-1.0, -1.0, -1.0, 0.1, 0.0, 0.0],
-            [-1e3, -1e3, -1e3, 1e3, -1e2, 10.0],
-        ],
-    ),
+/// Cohesion, kPa, and tensile strength as a share of the apex.
+pub(crate) const STRENGTHS: [(f64, Option<f64>); 5] = [
+    (0.0, None),
+    (10.0, None),
+    (10.0, Some(0.0)),
+    (10.0, Some(0.5)),
+    (10.0, Some(1.0)),
 ];
+
+/// Strains 11 22 33 12 13 23 in units of 100 kPa over a modulus.
+const PATHS: &str = "
+triaxial | 0.3 -1 0.3 0 0 0; 1 -2 1 0 0 0; -3 5 -3 0 0 0
+shear | 0 0 0 1 0.2 -0.1; 0 0 0 2 0.4 0.3; 0 0 0 -5 0 0
+to the apex and back | 1 1.1 0.9 0.01 0 0; 0.5 0.5 0.5 0 0 0; -2 -3 -2 0.5 0.1 0
+splitting | 2 0 -0.5 0.2 0 0.1; 1 -3 0 0 0 0; -9 0 0 1 1 1
+compression | -1 -1 -1 0.1 0 0; -1e3 -1e3 -1e3 1e3 -1e2 10
+";
 
 pub(crate) fn families() -> Vec<Family> {
     let mut implicit = Family::new(
         "Mohr–Coulomb, implicit",
         "sets of active planes, double-double",
     );
+    let paths = paths_of(PATHS);
     let angles = [0.0, 1e-6, 1e-3, 30.0, 45.0, 60.0, 80.0, 85.0, 89.0];
     let hypotheses = [
         Hypothesis::PlaneStrain,
@@ -339,14 +316,7 @@ pub(crate) fn families() -> Vec<Family> {
     for (i, phi) in angles.into_iter().enumerate() {
         for (j, share) in [0.0, 0.5, 1.0].into_iter().enumerate() {
             for (k, nu) in [-0.999, 0.0, 0.3, 0.499_999].into_iter().enumerate() {
-                let strengths = [
-                    (0.0, None),
-                    (10.0, None),
-                    (10.0, Some(0.0)),
-                    (10.0, Some(0.5)),
-                    (10.0, Some(1.0)),
-                ];
-                for (l, (cohesion, tension)) in strengths.into_iter().enumerate() {
+                for (l, (cohesion, tension)) in STRENGTHS.into_iter().enumerate() {
                     if phi == 0.0 && cohesion == 0.0 {
                         continue;
                     }
@@ -365,7 +335,7 @@ pub(crate) fn families() -> Vec<Family> {
                         // At the apex itself it changes nothing, and nine planes meet.
                         tensile: tension.filter(|t| *t < 1.0).map(|share| share * apex),
                     };
-                    let (path, segments) = PATHS[(i + j + k + l) % 5];
+                    let (path, segments) = &paths[(i + j + k + l) % 5];
                     let scale = [1e-2, 1.0, 1e5][(i + 2 * j + k) % 3];
                     let verdict = follow(&p, hypotheses[(j + k + l) % 3], segments, scale);
                     implicit.add(format!("{p:?}: {path} by {scale:e}"), verdict);

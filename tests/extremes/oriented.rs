@@ -3,9 +3,11 @@
 
 use crate::joint::near;
 use crate::matrix::{Family, Verdict};
+use crate::mohr_coulomb::STRENGTHS;
 use crate::point::{Point, Response, law, reason};
 use crate::wide::{Wide, sin_cos, wide};
 use abi::Hypothesis;
+use tests::words::paths_of;
 
 #[derive(Clone, Copy, Debug)]
 struct Oriented {
@@ -189,54 +191,24 @@ impl Oriented {
 }
 
 /// Strains 11 22 33 12 in units of the strength over E.
-const PATHS: [(&str, &[[f64; 4]]); 4] = [
-    (
-        "shear",
-        &[
-            [0.0, 0.0, 0.0, 0.4],
-            [0.0, 0.0, 0.0, 2.0],
-            [0.0, 0.0, 0.0, -5.0],
-        ],
-    ),
-    (
-        "zero and back",
-        &[
-            [0.0, 0.9, 0.0, 0.3],
-            [0.0, 0.5, 0.0, 0.3],
-            [0.0, -3.0, 0.0, 1.0],
-        ],
-    ),
-    (
-        "opens",
-        &[
-            [0.3, 3.0, -0.2, 0.0],
-            [0.0, 1.0, 0.0, 1e-3],
-            [-0.5, -9.0, 0.0, 2.0],
-        ],
-    ),
-    (
-        "compression",
-        &[[-1.0, -2.0, -0.5, 0.3], [0.0, -1e3, 0.0, -1e3]],
-    ),
-];
+const PATHS: &str = "
+shear | 0 0 0 0.4; 0 0 0 2; 0 0 0 -5
+zero and back | 0 0.9 0 0.3; 0 0.5 0 0.3; 0 -3 0 1
+opens | 0.3 3 -0.2 0; 0 1 0 1e-3; -0.5 -9 0 2
+compression | -1 -2 -0.5 0.3; 0 -1e3 0 -1e3
+";
 
 pub(crate) fn families() -> Vec<Family> {
     let mut family = Family::new(
         "oriented Mohr–Coulomb",
         "sets of active bounds, double-double",
     );
+    let paths = paths_of(PATHS);
     let angles = [0.0, 1e-6, 1e-3, 30.0, 45.0, 60.0, 89.0, 89.9999, 89.999_999];
     for (i, phi) in angles.into_iter().enumerate() {
         for (j, share) in [0.0, 0.5, 1.0].into_iter().enumerate() {
             for (k, nu) in [-0.999_999, 0.0, 0.3, 0.499_999_99].into_iter().enumerate() {
-                let strengths = [
-                    (0.0, None),
-                    (10.0, None),
-                    (10.0, Some(0.0)),
-                    (10.0, Some(0.5)),
-                    (10.0, Some(1.0)),
-                ];
-                for (l, (cohesion, tension)) in strengths.into_iter().enumerate() {
+                for (l, (cohesion, tension)) in STRENGTHS.into_iter().enumerate() {
                     if phi == 0.0 && cohesion == 0.0 {
                         continue;
                     }
@@ -254,7 +226,7 @@ pub(crate) fn families() -> Vec<Family> {
                         psi: phi * share,
                         tensile: tension.map(|share| share * apex),
                     };
-                    let (path, segments) = PATHS[(i + j + k + l) % 4];
+                    let (path, segments) = &paths[(i + j + k + l) % 4];
                     let scale = [1e-3, 1.0, 1e6][(i + 2 * j + k) % 3];
                     let hypothesis = [Hypothesis::PlaneStrain, Hypothesis::Axisymmetric][j % 2];
                     let verdict = follow(&oriented, hypothesis, segments, scale);

@@ -34,16 +34,12 @@ fn squeeze(t: f64, ratio: f64) -> Verdict {
     let text = format!(
         r#"
 analysis = "plane_strain"
+supports = [{{ line = "left", fixed = ["x"] }}, {{ line = "bottom", fixed = ["y"] }}]
 [mesh]
 columns = [{{ n = 1, to = 1.0 }}]
 rows = [{{ n = 1, to = {t:?} }}]
-[[mesh.region]]
-group = "layer"
-[mesh.lines]
-left = {{ x = 0.0 }}
-right = {{ x = 1.0 }}
-bottom = {{ y = 0.0 }}
-top = {{ y = {t:?} }}
+region = [{{ group = "layer" }}]
+lines = {{ left = {{ x = 0.0 }}, right = {{ x = 1.0 }}, bottom = {{ y = 0.0 }}, top = {{ y = {t:?} }} }}
 [laws.interface]
 law = "coulomb_joint"
 parameters = {{ normal_stiffness = {k_n:?}, shear_stiffness = {k_t:?}, cohesion = 1e3, friction_angle = 30.0, dilatancy_angle = 0.0 }}
@@ -51,19 +47,10 @@ parameters = {{ normal_stiffness = {k_n:?}, shear_stiffness = {k_t:?}, cohesion 
 formulation = "thin_layer"
 law = "interface"
 normal = "y"
-[[supports]]
-line = "left"
-fixed = ["x"]
-[[supports]]
-line = "bottom"
-fixed = ["y"]
 [[phase]]
 name = "squeeze"
 increments = 1
-pressure = [
-  {{ line = "top", value = {p} }},
-  {{ line = "right", value = {q} }},
-]
+pressure = [{{ line = "top", value = {p} }}, {{ line = "right", value = {q} }}]
 [probes]
 s_11 = {{ group = "layer", quantity = "stress_11", reduce = "max" }}
 s_22 = {{ group = "layer", quantity = "stress_22", reduce = "max" }}

@@ -21,18 +21,12 @@ fn blocks(with_first: bool, solver: &str) -> String {
     format!(
         r#"
 analysis = "plane_strain"
+supports = [{{ line = "base", fixed = ["x", "y"] }}, {{ line = "left", fixed = ["x", "y"] }}, {{ line = "right", fixed = ["x", "y"] }}]
 [mesh]
 origin = [0.0, 0.0]
 columns = [{{ n = 2, to = 1.0 }}, {{ n = 1, to = 1.1 }}, {{ n = 2, to = 2.1 }}]
 rows = [{{ n = 2, to = 1.0 }}]
-[[mesh.region]]
-group = "wall"
-[[mesh.region]]
-group = "first"
-x = [0.0, 1.0]
-[[mesh.region]]
-group = "second"
-x = [1.1, 2.1]
+region = [{{ group = "wall" }}, {{ group = "first", x = [0.0, 1.0] }}, {{ group = "second", x = [1.1, 2.1] }}]
 [mesh.lines]
 base = {{ y = 0.0 }}
 left = {{ x = 1.0 }}
@@ -47,15 +41,6 @@ ground = {{ law = "mohr_coulomb", parameters = {{ young_modulus = 34e3, poisson_
 wall = {{ formulation = "solid", integration = "full", law = "elastic" }}
 first = {{ formulation = "solid", integration = "full", law = "rock" }}
 second = {{ formulation = "solid", integration = "full", law = "ground" }}
-[[supports]]
-line = "base"
-fixed = ["x", "y"]
-[[supports]]
-line = "left"
-fixed = ["x", "y"]
-[[supports]]
-line = "right"
-fixed = ["x", "y"]
 [[phase]]
 name = "press"
 increments = 1
@@ -125,6 +110,7 @@ fn many_bodies_balance_together() {
     let finished = run(&format!(
         r#"
 analysis = "plane_strain"
+supports = [{{ line = "base", fixed = ["x", "y"] }}, {{ line = "left", fixed = ["x", "y"] }}]
 [mesh]
 origin = [0.0, 0.0]
 columns = [{columns}]
@@ -142,12 +128,6 @@ mc = {{ law = "mohr_coulomb", parameters = {{ young_modulus = 34e3, poisson_rati
 [groups]
 wall = {{ formulation = "solid", integration = "full", law = "elastic" }}
 ground = {{ formulation = "solid", integration = "full", law = "mc" }}
-[[supports]]
-line = "base"
-fixed = ["x", "y"]
-[[supports]]
-line = "left"
-fixed = ["x", "y"]
 {supports}
 [[phase]]
 name = "press"
@@ -176,21 +156,16 @@ fn a_body_is_moved_as_a_whole_without_force() {
             let finished = run(&format!(
                 r#"
 analysis = "plane_strain"
+supports = [{{ line = "base", fixed = ["y"] }}]
 [mesh]
 columns = [{{ n = 3, to = 1.0 }}]
 rows = [{{ n = 3, to = 1.0 }}]
-[[mesh.region]]
-group = "block"
-[mesh.lines]
-base = {{ y = 0.0 }}
-top = {{ y = 1.0 }}
+region = [{{ group = "block" }}]
+lines = {{ base = {{ y = 0.0 }}, top = {{ y = 1.0 }} }}
 [laws]
 ground = {law}
 [groups]
 block = {{ formulation = "solid", integration = "full", law = "ground" }}
-[[supports]]
-line = "base"
-fixed = ["y"]
 [[phase]]
 name = "one"
 increments = 2
@@ -226,31 +201,17 @@ fn earlier_loads_do_not_widen_the_tolerance() {
         run(&format!(
             r#"
 analysis = "plane_strain"
+supports = [{{ line = "base", fixed = ["y"] }}, {{ line = "left", fixed = ["x"] }}, {{ line = "right", fixed = ["x"] }}]
 [mesh]
 columns = [{{ n = 3, to = 1.0 }}, {{ n = 4, to = 5.0 }}]
 rows = [{{ n = 6, to = 4.0 }}]
-[[mesh.region]]
-group = "ground"
-[mesh.lines]
-base = {{ y = 0.0 }}
-left = {{ x = 0.0 }}
-right = {{ x = 5.0 }}
-top = {{ y = 4.0 }}
-strip = {{ y = 4.0, x = [0.0, 1.0] }}
+region = [{{ group = "ground" }}]
+lines = {{ base = {{ y = 0.0 }}, left = {{ x = 0.0 }}, right = {{ x = 5.0 }}, top = {{ y = 4.0 }}, strip = {{ y = 4.0, x = [0.0, 1.0] }} }}
 [laws]
 elastic = {{ law = "elastic", parameters = {{ young_modulus = 34e3, poisson_ratio = 0.3 }} }}
 mc = {{ law = "mohr_coulomb", parameters = {{ young_modulus = 34e3, poisson_ratio = 0.3, cohesion = 1.0, friction_angle = 30.0, dilatancy_angle = 0.0 }} }}
 [groups]
 ground = {{ formulation = "solid", integration = "full", law = "elastic" }}
-[[supports]]
-line = "base"
-fixed = ["y"]
-[[supports]]
-line = "left"
-fixed = ["x"]
-[[supports]]
-line = "right"
-fixed = ["x"]
 {before}
 [[phase]]
 name = "footing"

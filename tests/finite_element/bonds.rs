@@ -120,10 +120,8 @@ fn a_load_that_no_bond_carries_names_what_gives_way() {
     let top = "force = [{ line = \"top\", x = 70.0 }]";
     let failed = fail(&pushed(5, "cohesion = 18.17", top, ""));
     let (how, message) = gives_way(&failed);
-    assert!(
-        ["bond_breaks", "opens", "slides"].contains(&how.as_str()),
-        "{message}"
-    );
+    let ways = ["bond_breaks", "opens", "slides"];
+    assert!(ways.contains(&how.as_str()), "{message}");
     assert!(message.contains("what gives way: a"), "{message}");
     has(&message, "group `joint`, element 1, point");
 }

@@ -94,16 +94,8 @@ fn agree(case: &str, condensed: &[Row], sparse: &[Row], increments: usize) {
 /// The chamber with 520 unknowns on the boundary, next to which a factorisation takes longer than many iterations.
 const FINE: &str = r#"
 [mesh]
-columns = [
-  { n = 6, to = 0.010 },
-  { n = 1, to = 0.012 },
-  { n = 24, to = 0.262, ratio = 1.12 },
-]
-rows = [
-  { n = 2, to = 0.0 },
-  { n = 16, to = 0.180, ratio = 0.9 },
-  { n = 64, to = 0.680 },
-]
+columns = [{ n = 6, to = 0.010 }, { n = 1, to = 0.012 }, { n = 24, to = 0.262, ratio = 1.12 }]
+rows = [{ n = 2, to = 0.0 }, { n = 16, to = 0.180, ratio = 0.9 }, { n = 64, to = 0.680 }]
 [groups.interface]
 normal = "x"
 "#;
@@ -238,15 +230,8 @@ supports = [{ line = "base", fixed = ["x", "y"] }]
 origin = [0.0, -0.1]
 columns = [{ n = 4, to = 1.0 }, { n = 4, to = 2.0 }]
 rows = [{ n = 1, to = 0.0 }, { n = 1, to = 1e-2 }, { n = 2, to = 0.2 }]
-region = [
-  { group = "soil" },
-  { group = "yielding", x = [0.0, 1.0], y = [0.0, 1e-2] },
-  { group = "layer", x = [1.0, 2.0], y = [0.0, 1e-2] },
-]
-[mesh.lines]
-base = { y = -0.1 }
-top = { y = 0.2 }
-side = { x = 1.5, y = [0.0, 1e-2] }
+region = [{ group = "soil" }, { group = "yielding", x = [0.0, 1.0], y = [0.0, 1e-2] }, { group = "layer", x = [1.0, 2.0], y = [0.0, 1e-2] }]
+lines = { base = { y = -0.1 }, top = { y = 0.2 }, side = { x = 1.5, y = [0.0, 1e-2] } }
 [laws]
 soil = { law = "elastic", parameters = { young_modulus = 1e4, poisson_ratio = 0.2 } }
 [laws.yielding]
@@ -295,10 +280,7 @@ origin = [0.0, 0.0]
 columns = [{ n = 1, to = 1.0 }, { n = 8, to = 3.0 }]
 rows = [{ n = 8, to = 1.0 }]
 region = [{ group = "soil" }, { group = "yielding", x = [0.0, 1.0], y = [0.0, 1.0] }]
-[mesh.lines]
-wall = { x = 1.0, y = [0.0, 1.0] }
-peg = { y = 1.0, x = [2.75, 3.0] }
-top = { y = 1.0, x = [0.0, 2.0] }
+lines = { wall = { x = 1.0, y = [0.0, 1.0] }, peg = { y = 1.0, x = [2.75, 3.0] }, top = { y = 1.0, x = [0.0, 2.0] } }
 [laws]
 soil = { law = "elastic", parameters = { young_modulus = 1e4, poisson_ratio = 0.2 } }
 [laws.yielding]
@@ -344,13 +326,7 @@ const AT_REST: &str = r#"analysis = "plane_strain"
 columns = [{ n = 7, to = 1.0, ratio = 1.3 }]
 rows = [{ n = 2, to = 0.3 }, { n = 5, to = 0.9, ratio = 1.2 }, { n = 2, to = 1.1 }]
 region = [{ group = "soil" }, { group = "yielding", y = [0.0, 0.3] }]
-[mesh.lines]
-left = { x = 0.0 }
-right = { x = 1.0 }
-base = { y = 0.0 }
-seam = { y = 0.3 }
-top = { y = 1.1 }
-inside = { y = 0.9 }
+lines = { left = { x = 0.0 }, right = { x = 1.0 }, base = { y = 0.0 }, seam = { y = 0.3 }, top = { y = 1.1 }, inside = { y = 0.9 } }
 [laws]
 soil = { law = "elastic", parameters = { young_modulus = 1e4, poisson_ratio = 0.2 } }
 [laws.yielding]

@@ -40,13 +40,7 @@ fn cut_backs_end_where_small_increments_end() {
     // Limits do not depend on the path; what is left is the slow approach to it.
     assert_close("pressure", a, b, 2e-3, b);
     // Prescribed values are met exactly, and there is one row per increment of the file.
-    assert_close(
-        "settlement",
-        cut.last("settlement"),
-        footing.settlement,
-        1e-15,
-        1.0,
-    );
+    cut.ends_at("settlement", footing.settlement, 1e-15, 1.0);
     assert_eq!(cut.history("pressure").len(), 3);
     let summary = cut.summary();
     let recorded = summary["phases"][0]["cut_backs"].as_u64().unwrap();

@@ -62,17 +62,10 @@ supports = [
 ]
 [mesh]
 origin = [0.0, {:?}]
-columns = [
-  {{ n = {n}, to = 1.0, ratio = {under} }},
-  {{ n = {}, to = {width:?}, ratio = {} }},
-]
+columns = [{{ n = {n}, to = 1.0, ratio = {under} }}, {{ n = {}, to = {width:?}, ratio = {} }}]
 rows = [{{ n = {}, to = 0.0, ratio = {} }}]
 region = [{{ group = "ground" }}]
-[mesh.lines]
-axis = {{ x = 0.0 }}
-right = {{ x = {width:?} }}
-bottom = {{ y = {:?} }}
-strip = {{ y = 0.0, x = [0.0, 1.0] }}
+lines = {{ axis = {{ x = 0.0 }}, right = {{ x = {width:?} }}, bottom = {{ y = {:?} }}, strip = {{ y = 0.0, x = [0.0, 1.0] }} }}
 [laws.ground]
 law = "mohr_coulomb"
 [laws.ground.parameters]

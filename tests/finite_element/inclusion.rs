@@ -94,11 +94,7 @@ fn k_l(core: (f64, f64), b: f64, n: usize, interface: Interface) -> f64 {
     let text = format!(
         r#"
 analysis = "axisymmetric"
-supports = [
-  {{ line = "top", fixed = ["z"] }},
-  {{ line = "bottom", fixed = ["z"] }},
-  {{ line = "axis", fixed = ["r"] }},
-]
+supports = [{{ line = "top", fixed = ["z"] }}, {{ line = "bottom", fixed = ["z"] }}, {{ line = "axis", fixed = ["r"] }}]
 [mesh]
 columns = [{{ n = 1, to = {A} }}, {{ n = {across}, to = {} }}, {{ n = {n}, to = {b}, ratio = {ratio} }}]
 rows = [{{ n = 1, to = {HEIGHT} }}]

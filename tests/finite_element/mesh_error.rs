@@ -249,11 +249,7 @@ fn a_jump_between_groups_is_no_error() {
     let text = format!(
         r#"
 analysis = "plane_strain"
-supports = [
-  {{ line = "bottom", fixed = ["y"] }},
-  {{ line = "left", fixed = ["x"] }},
-  {{ line = "right", fixed = ["x"] }},
-]
+supports = [{{ line = "bottom", fixed = ["y"] }}, {{ line = "left", fixed = ["x"] }}, {{ line = "right", fixed = ["x"] }}]
 mesh.columns = [{{ n = 3, to = 1.0 }}]
 mesh.rows = [{{ n = 3, to = 1.0 }}, {{ n = 3, to = 2.0 }}]
 mesh.region = [{{ group = "soft" }}, {{ group = "stiff", y = [1.0, 2.0] }}]
@@ -293,10 +289,7 @@ supports = [{ line = "bottom", fixed = ["x", "y"] }]
 columns = [{ n = 3, to = 1.0 }]
 rows = [{ n = 2, to = 1.0 }, { n = 2, to = 2.0 }]
 region = [{ group = "lower" }, { group = "upper", y = [1.0, 2.0] }]
-[mesh.lines]
-bottom = { y = 0.0 }
-top = { y = 2.0 }
-seam = { y = 1.0 }
+lines = { bottom = { y = 0.0 }, top = { y = 2.0 }, seam = { y = 1.0 } }
 [laws]
 soil = { law = "elastic", parameters = { young_modulus = 1e4, poisson_ratio = 0.3 } }
 joint = { law = "coulomb_joint", parameters = { normal_stiffness = 1e6, shear_stiffness = 1e6, cohesion = 0.0, friction_angle = 20.0, dilatancy_angle = 0.0 } }

@@ -20,11 +20,7 @@ fn pile(increments: usize, unit: f64, tolerance: f64) -> String {
         r#"
 title = "pile in sand"
 analysis = "axisymmetric"
-supports = [
-  {{ line = "axis", fixed = ["r"] }},
-  {{ line = "far", fixed = ["r"] }},
-  {{ line = "bottom", fixed = ["r", "z"] }},
-]
+supports = [{{ line = "axis", fixed = ["r"] }}, {{ line = "far", fixed = ["r"] }}, {{ line = "bottom", fixed = ["r", "z"] }}]
 [mesh]
 origin = [0.0, -20.0]
 columns = [{{ n = 2, to = 0.5 }}, {{ n = 4, to = 1.5, ratio = 1.4 }}, {{ n = 7, to = 15.0, ratio = 1.5 }}]
@@ -148,6 +144,7 @@ fn a_block_pushed_beyond_its_friction_is_in_no_equilibrium() {
             r#"
 title = "block"
 analysis = "plane_strain"
+supports = [{{ line = "left", fixed = ["x"] }}, {{ line = "right", fixed = ["x"] }}, {{ line = "bottom", fixed = ["x", "y"] }}]
 [mesh]
 origin = [-1.0, 0.0]
 columns = [{{ n = 6, to = 1.0 }}]
@@ -166,15 +163,6 @@ skin = {{ law = "coulomb_joint", parameters = {{ normal_stiffness = 1e6, shear_s
 soil = {{ formulation = "solid", law = "soil" }}
 block = {{ formulation = "solid", law = "concrete" }}
 joint = {{ formulation = "zero_thickness", line = "joint", law = "skin" }}
-[[supports]]
-line = "left"
-fixed = ["x"]
-[[supports]]
-line = "right"
-fixed = ["x"]
-[[supports]]
-line = "bottom"
-fixed = ["x", "y"]
 [[phase]]
 name = "press"
 increments = 1

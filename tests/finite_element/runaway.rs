@@ -44,21 +44,13 @@ fn pile(solver: &str) -> String {
     format!(
         r#"
 analysis = "axisymmetric"
-supports = [
-  {{ line = "bottom", fixed = ["x", "y"] }},
-  {{ line = "left", fixed = ["x"] }},
-  {{ line = "right", fixed = ["x"] }},
-]
+supports = [{{ line = "bottom", fixed = ["x", "y"] }}, {{ line = "left", fixed = ["x"] }}, {{ line = "right", fixed = ["x"] }}]
 [mesh]
 origin = [1.0, 0.0]
 columns = [{{ n = 2, to = 1.04 }}, {{ n = 1, to = 1.041 }}, {{ n = 2, to = 1.1 }}]
 rows = [{{ n = 4, to = 0.05 }}, {{ n = 1, to = 0.051 }}, {{ n = 4, to = 0.1 }}]
 region = [{{ group = "ground" }}, {{ group = "pile", x = [1.0, 1.04], y = [0.05, 0.1] }}]
-[mesh.lines]
-left = {{ x = 1.0 }}
-right = {{ x = 1.1 }}
-bottom = {{ y = 0.0 }}
-head = {{ y = 0.1, x = [1.0, 1.04] }}
+lines = {{ left = {{ x = 1.0 }}, right = {{ x = 1.1 }}, bottom = {{ y = 0.0 }}, head = {{ y = 0.1, x = [1.0, 1.04] }} }}
 [laws]
 steel = {{ law = "elastic", parameters = {{ young_modulus = 210e6, poisson_ratio = 0.28 }} }}
 [laws.ground]
@@ -105,10 +97,7 @@ origin = [-1.0, -2.0]
 columns = [{{ n = 1, to = -0.96 }}, {{ n = 1, to = -0.9 }}]
 rows = [{{ n = 4, to = -1.5 }}, {{ n = 4, to = -1.0 }}]
 region = [{{ group = "ground" }}, {{ group = "block", x = [-1.0, -0.96], y = [-1.5, -1.0] }}]
-[mesh.lines]
-left = {{ x = -1.0 }}
-bottom = {{ y = -2.0 }}
-head = {{ y = -1.0, x = [-1.0, -0.96] }}
+lines = {{ left = {{ x = -1.0 }}, bottom = {{ y = -2.0 }}, head = {{ y = -1.0, x = [-1.0, -0.96] }} }}
 [laws]
 steel = {{ law = "elastic", parameters = {{ young_modulus = 210e6, poisson_ratio = 0.28 }} }}
 [laws.ground]
@@ -191,16 +180,11 @@ fn strongly_graded(text: &str, n: usize, by: f64) -> String {
     let (mild, strong) = (ratio(5.0), ratio(by));
     let mut text = text.to_owned();
     for (old, new) in [
-        (format!("ratio = {mild} "), format!("ratio = {strong} ")),
-        (
-            format!("ratio = {} ", (1.0 / mild).sqrt()),
-            format!("ratio = {} ", (1.0 / strong).sqrt()),
-        ),
-        (
-            format!("ratio = {} ", mild.sqrt()),
-            format!("ratio = {} ", strong.sqrt()),
-        ),
+        (mild, strong),
+        ((1.0 / mild).sqrt(), (1.0 / strong).sqrt()),
+        (mild.sqrt(), strong.sqrt()),
     ] {
+        let [old, new] = [old, new].map(|ratio| format!("ratio = {ratio} "));
         assert_eq!(text.matches(&old).count(), 1, "{old}");
         text = text.replace(&old, &new);
     }
@@ -234,25 +218,13 @@ fn both_criteria_are_given_and_the_failed_one_first() {
 /// A pile in an elastic ground whose layer slides; with the matrix of a step's start corrections grow tenfold.
 const GROWS: &str = r#"
 analysis = "axisymmetric"
-supports = [
-  { line = "bottom", fixed = ["x", "y"] },
-  { line = "far", fixed = ["x"] },
-  { line = "axis", fixed = ["x"] },
-]
+supports = [{ line = "bottom", fixed = ["x", "y"] }, { line = "far", fixed = ["x"] }, { line = "axis", fixed = ["x"] }]
 [mesh]
 origin = [0.0, -6.0]
 columns = [{ n = 1, to = 0.5 }, { n = 1, to = 0.52 }, { n = 5, to = 5.0, ratio = 1.3 }]
 rows = [{ n = 2, to = -2.0 }, { n = 4, to = 0.0 }]
-region = [
-  { group = "ground" },
-  { group = "pile", x = [0.0, 0.5] },
-  { group = "shaft", x = [0.5, 0.52] },
-]
-[mesh.lines]
-axis = { x = 0.0 }
-far = { x = 5.0 }
-bottom = { y = -6.0 }
-head = { x = [0.0, 0.5], y = 0.0 }
+region = [{ group = "ground" }, { group = "pile", x = [0.0, 0.5] }, { group = "shaft", x = [0.5, 0.52] }]
+lines = { axis = { x = 0.0 }, far = { x = 5.0 }, bottom = { y = -6.0 }, head = { x = [0.0, 0.5], y = 0.0 } }
 [laws]
 ground = { law = "elastic", parameters = { young_modulus = 20e3, poisson_ratio = 0.3 } }
 concrete = { law = "elastic", parameters = { young_modulus = 30e6, poisson_ratio = 0.2 } }

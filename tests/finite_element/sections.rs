@@ -35,11 +35,11 @@ fn column(standing: bool, probes: &str, joint: bool) -> crate::setup::Finished {
     let cut = 4.0 * 2.3 / sum;
     run(&format!(
         r#"analysis = "plane_strain"
+supports = [{{ line = "{foot}", fixed = ["{long}"] }}, {{ line = "side", fixed = ["{short}"] }}]
 [mesh]
 columns = [{columns}]
 rows = [{rows}]
-[[mesh.region]]
-group = "column"
+region = [{{ group = "column" }}]
 [mesh.lines]
 foot = {{ {long} = 0.0 }}
 side = {{ {short} = 0.0 }}
@@ -56,12 +56,6 @@ parameters = {{ normal_stiffness = 1e6, shear_stiffness = 4e5, cohesion = 10.0, 
 [groups]
 column = {{ formulation = "solid", integration = "full", law = "column" }}
 {joint}
-[[supports]]
-line = "{foot}"
-fixed = ["{long}"]
-[[supports]]
-line = "side"
-fixed = ["{short}"]
 [[phase]]
 name = "load"
 increments = 1
@@ -83,13 +77,7 @@ fn the_force_through_a_section_is_the_load_beyond_it() {
         let probes: String = ["foot", "cut", "part", "head", "along"].map(probe).concat();
         let finished = column(standing, &probes, false);
         let close = |line: &str, expected: f64| {
-            assert_close(
-                &format!("{axis} {line}"),
-                finished.last(line),
-                expected,
-                EXACT,
-                10.0,
-            );
+            finished.ends_at(line, expected, EXACT, 10.0);
         };
         // Through the section, and through a part of it that ends inside; compression positive.
         close("cut", 10.0);
@@ -113,13 +101,7 @@ fn bodies_and_the_interface_between_them_pass_on_one_force() {
         let probes: String = ["column", "joint"].map(probe).concat();
         let finished = column(standing, &probes, true);
         for group in ["column", "joint"] {
-            assert_close(
-                &format!("{axis} {group}"),
-                finished.last(group),
-                10.0,
-                EXACT,
-                10.0,
-            );
+            finished.ends_at(group, 10.0, EXACT, 10.0);
         }
     }
 }
@@ -142,6 +124,7 @@ fn pile(layer: bool) -> crate::setup::Finished {
     };
     run(&format!(
         r#"analysis = "axisymmetric"
+supports = [{{ line = "axis", fixed = ["r"] }}, {{ line = "wall", fixed = ["r", "z"] }}, {{ line = "base", fixed = ["z"] }}]
 [mesh]
 columns = [{columns}]
 rows = [{{ n = 6, to = 2.0, ratio = 1.6 }}]
@@ -170,15 +153,6 @@ parameters = {{ normal_stiffness = 1e6, shear_stiffness = 3e5, cohesion = 5.0, f
 soil = {{ formulation = "solid", integration = "full", law = "soil" }}
 pile = {{ formulation = "solid", integration = "full", law = "pile" }}
 skin = {group}
-[[supports]]
-line = "axis"
-fixed = ["r"]
-[[supports]]
-line = "wall"
-fixed = ["r", "z"]
-[[supports]]
-line = "base"
-fixed = ["z"]
 [[phase]]
 name = "push"
 increments = 5
@@ -207,13 +181,7 @@ fn the_integral_of_the_friction_is_what_the_shaft_carries() {
     assert_close("integral", integral, shaft, EXACT, shaft);
     // The whole turn times the length.
     let area = 2.0 * PI * 0.3 * 2.0;
-    assert_close(
-        "average",
-        finished.last("average"),
-        integral / area,
-        EXACT,
-        shaft / area,
-    );
+    finished.ends_at("average", integral / area, EXACT, shaft / area);
     // Points are close where elements are small, so their arithmetic mean is another number.
     assert!((mean * area / shaft - 1.0).abs() > 0.01, "{}", mean * area);
     let parts = finished.last("lower") + finished.last("upper");
@@ -222,13 +190,7 @@ fn the_integral_of_the_friction_is_what_the_shaft_carries() {
     assert_close("edges", finished.last("edges"), integral, EXACT, shaft);
     let volume = PI * 0.3 * 0.3 * 2.0;
     let stress = finished.last("stress");
-    assert_close(
-        "volume",
-        finished.last("volume"),
-        stress * volume,
-        EXACT,
-        stress.abs() * volume,
-    );
+    finished.ends_at("volume", stress * volume, EXACT, stress.abs() * volume);
     assert_eq!(finished.summary()["probe_units"]["integral"], "kN");
 }
 
@@ -244,24 +206,18 @@ fn so_it_is_of_a_layer() {
 #[test]
 fn an_interface_that_ends_inside_hands_on_all_of_its_traction() {
     let finished = run(r#"analysis = "plane_strain"
+supports = [{ line = "base", fixed = ["x", "y"] }]
 [mesh]
 columns = [{ n = 4, to = 1.0 }]
 rows = [{ n = 4, to = 1.0 }]
-[[mesh.region]]
-group = "block"
-[mesh.lines]
-base = { y = 0.0 }
-top = { y = 1.0 }
-half = { y = 0.5, x = [0.0, 0.5] }
+region = [{ group = "block" }]
+lines = { base = { y = 0.0 }, top = { y = 1.0 }, half = { y = 0.5, x = [0.0, 0.5] } }
 [laws]
 elastic = { law = "elastic", parameters = { young_modulus = 34e3, poisson_ratio = 0.0 } }
 joint = { law = "coulomb_joint", parameters = { normal_stiffness = 1e7, shear_stiffness = 1e7, cohesion = 1000.0, friction_angle = 30.0, dilatancy_angle = 0.0 } }
 [groups]
 block = { formulation = "solid", integration = "full", law = "elastic", initial_stress = [0.0, -100.0, 0.0, 0.0] }
 joint = { formulation = "zero_thickness", line = "half", integration = "nodes", law = "joint" }
-[[supports]]
-line = "base"
-fixed = ["x", "y"]
 [[phase]]
 name = "one"
 increments = 1

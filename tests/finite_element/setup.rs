@@ -55,6 +55,12 @@ pub(crate) trait Results {
         *self.history(probe).last().expect("an increment")
     }
 
+    /// Asserts that a probe ends at this value, to a part of the scale.
+    #[track_caller]
+    fn ends_at(&self, probe: &str, expected: f64, tolerance: f64, scale: f64) {
+        assert_close(probe, self.last(probe), expected, tolerance, scale);
+    }
+
     /// Values of a probe in one phase.
     fn in_phase(&self, phase: &str, probe: &str) -> Vec<f64> {
         let rows = table(&self.folder().join("history.csv"));

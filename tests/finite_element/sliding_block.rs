@@ -75,11 +75,7 @@ pub(crate) fn text(kind: Kind, laws: &str, phases: &str) -> String {
     format!(
         r#"
 analysis = "plane_strain"
-supports = [
-  {{ line = "base", fixed = ["x", "y"] }},
-  {{ line = "base_left", fixed = ["x", "y"] }},
-  {{ line = "base_right", fixed = ["x", "y"] }},
-]
+supports = [{{ line = "base", fixed = ["x", "y"] }}, {{ line = "base_left", fixed = ["x", "y"] }}, {{ line = "base_right", fixed = ["x", "y"] }}]
 [mesh]
 origin = [0.0, -0.1]
 columns = [{{ n = 1, to = 1.0 }}]

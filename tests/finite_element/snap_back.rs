@@ -58,10 +58,7 @@ region = [
   {{ group = "nothing", x = [1.0, 2.0], y = [0.0, 1e-4] }},
   {{ group = "rope", x = [1.0, 2.0], y = [1e-4, {top:?}] }},
 ]
-[mesh.lines]
-base = {{ y = -0.1 }}
-top = {{ y = {top:?}, x = [0.0, 1.0] }}
-end = {{ x = 2.0, y = [1e-4, {top:?}] }}
+lines = {{ base = {{ y = -0.1 }}, top = {{ y = {top:?}, x = [0.0, 1.0] }}, end = {{ x = 2.0, y = [1e-4, {top:?}] }} }}
 [laws]
 rigid = {{ law = "elastic", parameters = {{ young_modulus = 1e10, poisson_ratio = 0.0 }} }}
 rope = {{ law = "elastic", parameters = {{ young_modulus = 5e5, poisson_ratio = 0.0 }} }}
@@ -273,11 +270,7 @@ fn the_arc_length_takes_over_at_the_last_halving() {
 fn a_path_that_runs_backwards_is_recognised() {
     let text = r#"
 analysis = "axisymmetric"
-supports = [
-  { line = "axis", fixed = ["x"] },
-  { line = "bottom", fixed = ["x", "y"] },
-  { line = "far", fixed = ["x"] },
-]
+supports = [{ line = "axis", fixed = ["x"] }, { line = "bottom", fixed = ["x", "y"] }, { line = "far", fixed = ["x"] }]
 water = { level = -0.2186 }
 [mesh]
 origin = [0.0, -4.31501]

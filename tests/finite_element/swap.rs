@@ -59,20 +59,12 @@ fn text(group: &str, phases: &str) -> String {
     format!(
         r#"
 analysis = "plane_strain"
-supports = [
-  {{ line = "bottom", fixed = ["y"] }},
-  {{ line = "left", fixed = ["x"] }},
-  {{ line = "right", fixed = ["x"] }},
-]
+supports = [{{ line = "bottom", fixed = ["y"] }}, {{ line = "left", fixed = ["x"] }}, {{ line = "right", fixed = ["x"] }}]
 [mesh]
 columns = [{{ n = 1, to = 1.0 }}]
 rows = [{{ n = 1, to = 1.0 }}]
 region = [{{ group = "ground" }}]
-[mesh.lines]
-left = {{ x = 0.0 }}
-right = {{ x = 1.0 }}
-bottom = {{ y = 0.0 }}
-top = {{ y = 1.0 }}
+lines = {{ left = {{ x = 0.0 }}, right = {{ x = 1.0 }}, bottom = {{ y = 0.0 }}, top = {{ y = 1.0 }} }}
 [laws]
 {}{}{}{}
 [groups.ground]
@@ -166,11 +158,7 @@ fn strip(increments: usize, in_two: bool) -> f64 {
     let text = format!(
         r#"
 analysis = "plane_strain"
-supports = [
-  {{ line = "left", fixed = ["x"] }},
-  {{ line = "right", fixed = ["x"] }},
-  {{ line = "bottom", fixed = ["x", "y"] }},
-]
+supports = [{{ line = "left", fixed = ["x"] }}, {{ line = "right", fixed = ["x"] }}, {{ line = "bottom", fixed = ["x", "y"] }}]
 [mesh]
 columns = [{{ n = 4, to = 1.0 }}, {{ n = 6, to = 5.0, ratio = 1.3 }}]
 rows = [{{ n = 8, to = 4.0, ratio = 0.85 }}]
@@ -364,11 +352,7 @@ supports = [{{ line = "bottom", fixed = ["y"] }}, {{ line = "left", fixed = ["x"
 columns = [{{ n = 2, to = 1.0 }}, {{ n = 2, to = 2.0 }}]
 rows = [{{ n = 3, to = 1.0 }}]
 region = [{{ group = "soil" }}]
-[mesh.lines]
-bottom = {{ y = 0.0 }}
-top = {{ y = 1.0 }}
-left = {{ x = 0.0 }}
-seam = {{ x = 1.0 }}
+lines = {{ bottom = {{ y = 0.0 }}, top = {{ y = 1.0 }}, left = {{ x = 0.0 }}, seam = {{ x = 1.0 }} }}
 [laws]
 soil = {{ law = "elastic", parameters = {{ young_modulus = 1e4, poisson_ratio = 0.3 }} }}
 first = {}

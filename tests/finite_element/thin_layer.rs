@@ -21,6 +21,7 @@ use crate::setup::{Results, assert_close, elastic, fail, run};
 use input::Error;
 use std::path::Path;
 use tests::tolerance::EQUILIBRIUM;
+use tests::words::has;
 
 /// One element of length 1 and this thickness.
 fn single(thickness: f64, k_n: f64, group: &str) -> String {
@@ -89,11 +90,7 @@ fn stiffnesses_that_no_elastic_layer_has_are_refused() {
         let text = single(0.02, k_n, "");
         let failed = fail(&text);
         assert_eq!(place(&failed.error, &text), "\"interface\"");
-        assert!(
-            failed.error.to_string().contains("K_n > 4/3 K_t"),
-            "{}",
-            failed.error
-        );
+        has(failed.error.to_string(), "K_n > 4/3 K_t");
         assert!(
             !failed.folder().join("history.csv").exists(),
             "half-written results"
@@ -108,11 +105,7 @@ fn a_direction_across_that_is_not_clear_must_be_given() {
         let text = single(thickness, 1e6, "");
         let failed = fail(&text);
         assert_eq!(place(&failed.error, &text), "layer");
-        assert!(
-            failed.error.to_string().contains("across the layer"),
-            "{}",
-            failed.error
-        );
+        has(failed.error.to_string(), "across the layer");
         for normal in ["x", "y"] {
             run(&single(thickness, 1e6, &format!("normal = \"{normal}\"")));
         }
@@ -166,20 +159,8 @@ fn a_layer_on_ground_has_no_free_modes() {
         let across = (-50.0 * m + 30.0 * lambda) / determinant;
         let scale = scale / m;
         assert_close("right", finished.last("right"), along, EQUILIBRIUM, scale);
-        assert_close(
-            "top",
-            finished.last("top"),
-            across * (t + 0.5),
-            EQUILIBRIUM,
-            scale,
-        );
-        assert_close(
-            "turn",
-            finished.last("corner"),
-            across * (t + 0.5),
-            EQUILIBRIUM,
-            scale,
-        );
+        finished.ends_at("top", across * (t + 0.5), EQUILIBRIUM, scale);
+        finished.ends_at("corner", across * (t + 0.5), EQUILIBRIUM, scale);
     }
 }
 

@@ -29,15 +29,8 @@ supports = [{{ line = "bottom", fixed = ["y"] }}, {{ line = "left", fixed = ["x"
 origin = [5.0, {origin:?}]
 columns = [{{ n = 2, to = 5.4 }}, {{ n = 1, to = 5.4001 }}, {{ n = 2, to = 6.0, ratio = 1.0 }}]
 rows = {rows}
-region = [
-  {{ group = "a" }},
-  {{ group = "b", x = [5.0, 5.4], y = {b:?} }},
-  {{ group = "i", x = [5.0, 5.4], y = {i:?} }},
-]
-[mesh.lines]
-left = {{ x = 5.0 }}
-bottom = {{ y = 0.0 }}
-head = {{ y = {top:?}, x = [5.0, 5.4] }}
+region = [{{ group = "a" }}, {{ group = "b", x = [5.0, 5.4], y = {b:?} }}, {{ group = "i", x = [5.0, 5.4], y = {i:?} }}]
+lines = {{ left = {{ x = 5.0 }}, bottom = {{ y = 0.0 }}, head = {{ y = {top:?}, x = [5.0, 5.4] }} }}
 [laws]
 sand = {{ law = "elastic", parameters = {{ young_modulus = 34e3, poisson_ratio = 0.3 }} }}
 mepi = {{ law = "mepi", parameters = {{ k_n = 86e3, k_t = 37e3, n = 0.55, mu_0 = 0.27, mu_p = 0.7, mu_c0 = 0.46, a = 0.008, c_0 = 40.0, t = 0.002, p_0 = 100.0, sigma_ni = 100.0 }} }}
@@ -82,12 +75,7 @@ fn both_ways_up_no_force_is_left() {
 /// moves. All motion is round-off.
 const NOTHING: &str = r#"
 analysis = "axisymmetric"
-supports = [
-  { line = "axis", fixed = ["r"] },
-  { line = "wall", fixed = ["r"] },
-  { line = "ends", fixed = ["z"] },
-  { line = "top", fixed = ["z"] },
-]
+supports = [{ line = "axis", fixed = ["r"] }, { line = "wall", fixed = ["r"] }, { line = "ends", fixed = ["z"] }, { line = "top", fixed = ["z"] }]
 [mesh]
 columns = [{ n = 2, to = 0.25 }, { n = 4, to = 4.0 }]
 rows = [{ n = 2, to = 1.0 }]

@@ -29,12 +29,13 @@ fn pkg_config_finds_the_headers() {
     let prefix = place.prefix.to_str().unwrap();
     let pages = format!("{prefix}/lib/pkgconfig");
     let told = |what: &str| {
-        let told = place.shell_with(
-            "",
-            &format!("pkg-config {what} pilum"),
-            &[("PKG_CONFIG_PATH", &pages)],
-        );
-        assert_eq!(told.code, Some(0), "{}", told.stderr);
+        let told = place
+            .shell_with(
+                "",
+                &format!("pkg-config {what} pilum"),
+                &[("PKG_CONFIG_PATH", &pages)],
+            )
+            .ended(0);
         told.stdout.trim().to_owned()
     };
     assert_eq!(told("--modversion"), env!("CARGO_PKG_VERSION"));

@@ -210,8 +210,7 @@ fn a_program_without_laws_says_where_it_looks() {
     fs::copy(place.prefix.join("bin/pilum"), bin.join("pilum")).unwrap();
     let case = place.prefix.join("share/pilum/cases/chamber_mesh1");
     let run = format!("alone/bin/pilum run '{}'", case.display());
-    let outcome = place.shell("", &run);
-    assert_eq!(outcome.code, Some(3), "{}", outcome.stderr);
+    let outcome = place.shell("", &run).ended(3);
     let said: String = outcome.stderr.split_whitespace().collect();
     let looked_in = place.work().canonicalize().unwrap().join("alone/lib/pilum");
     for text in [

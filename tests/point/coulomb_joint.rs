@@ -60,12 +60,6 @@ fn follows_closed_form(run: &Run, k_s: f64) {
 }
 
 #[test]
-fn constant_normal_stress() {
-    let run = run("[[segment]]\nincrements = 40\ncontrol = { t = { jump = 4e-3 } }");
-    follows_closed_form(&run, 0.0);
-}
-
-#[test]
 fn constant_volume() {
     let run =
         run("[[segment]]\nincrements = 40\ncontrol = { t = { jump = 4e-3 }, n = { jump = 0 } }");

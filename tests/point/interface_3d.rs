@@ -8,6 +8,7 @@
 use crate::driver::{attempt, follow};
 use approx::assert_relative_eq;
 use tests::words::edited;
+use tests::words::rows_of;
 
 const K_T: f64 = 4e5;
 const PHI: f64 = 30.0;
@@ -126,27 +127,24 @@ fn mistakes_are_told_at_their_place() {
         format!("{start}[[segment]]\nincrements = 1\ncontrol = {{ {control} }}")
     };
     let three = driver("interface_3d", "");
-    for (text, said) in [
-        (
-            driver("interface_2d", "s = { jump = 1e-3 }"),
-            "there is no component `s` under interface_2d | components: n, t",
-        ),
-        (
-            driver("interface_3d", "s = { strain = 1e-3 }"),
-            "component `s` cannot be controlled by `strain` under interface_3d | jump, traction, stiffness",
-        ),
-        (
-            edited(&three, &["traction = => stress ="]),
-            "under interface_3d the initial state is a traction | components n, t, s",
-        ),
-        (
-            edited(&three, &["coulomb_joint => mepi"]),
-            "interface_3d | interface_2d",
-        ),
-    ] {
+    let two = driver("interface_2d", "s = { jump = 1e-3 }");
+    let strain = driver("interface_3d", "s = { strain = 1e-3 }");
+    let stress = edited(&three, &["traction = => stress ="]);
+    let mepi = edited(&three, &["coulomb_joint => mepi"]);
+    for ([said, words], text) in rows_of(
+        "
+there is no component `s` under interface_2d | components: n, t
+component `s` cannot be controlled by `strain` under interface_3d | jump, traction, stiffness
+under interface_3d the initial state is a traction | components n, t, s
+interface_3d | interface_2d
+",
+    )
+    .into_iter()
+    .zip([two, strain, stress, mepi])
+    {
         let run = attempt(&text);
         let message = format!("{} {:?}", run.error(), run.error());
-        for words in said.split(" | ") {
+        for words in [said, words] {
             assert!(message.contains(words), "{message}");
         }
     }

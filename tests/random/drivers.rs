@@ -384,28 +384,15 @@ fn drivers_end_the_same_in_a_mirror_and_in_other_units() {
             let plain = path.run(PLAIN)?;
             path.check(&plain)?;
             let is_isotropic = ["elastic", "mohr_coulomb"].contains(&path.law.id);
+            let view = |mirrored, unit, turned| View {
+                unit,
+                mirrored,
+                turned,
+            };
             let views = [
-                (
-                    View {
-                        mirrored: true,
-                        ..PLAIN
-                    },
-                    true,
-                ),
-                (
-                    View {
-                        unit: 1e-3,
-                        ..PLAIN
-                    },
-                    true,
-                ),
-                (
-                    View {
-                        turned: true,
-                        ..PLAIN
-                    },
-                    is_isotropic,
-                ),
+                (view(true, 1.0, false), true),
+                (view(false, 1e-3, false), true),
+                (view(false, 1.0, true), is_isotropic),
             ];
             for (view, _) in views.into_iter().filter(|(_, permitted)| *permitted) {
                 let other = path.run(view)?;

@@ -9,6 +9,7 @@ use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
+use tests::or_skip;
 
 const NAMES: [&str; 4] = [
     "chromium",
@@ -94,9 +95,7 @@ fn text(value: &Value) -> &str {
 
 #[test]
 fn a_report_works() {
-    let Some(outcome) = selftest(&folders().layer.join("report.html")) else {
-        return;
-    };
+    let outcome = or_skip!(selftest(&folders().layer.join("report.html")));
     // Two figures, the chooser, three profiles, the contours, the residuals.
     assert_eq!(outcome["canvases"].as_array().unwrap().len(), 8);
     for figure in outcome["figures"].as_array().unwrap() {
@@ -142,9 +141,7 @@ fn a_run_without_equilibrium_has_a_report_that_works() {
 
 #[test]
 fn a_comparison_works() {
-    let Some(outcome) = selftest(&folders().comparison) else {
-        return;
-    };
+    let outcome = or_skip!(selftest(&folders().comparison));
     let hover = text(&outcome["figures"][0]["hover"]);
     assert!(hover.starts_with("layer & more: force\n"), "{hover}");
     // At the end two of the runs have a profile, at the start all three.
@@ -168,9 +165,7 @@ fn a_study_is_drawn() {
         &place.path().join("report.html"),
     );
     let page = page.unwrap();
-    let Some(document) = document(&page, "") else {
-        return;
-    };
+    let document = or_skip!(document(&page, ""));
     assert!(document.contains("data-drawn=\"yes\""), "{document}");
     let count = |what: &str| document.matches(what).count();
     // Two outputs by two parameters; a tornado each; the curves and their colours.

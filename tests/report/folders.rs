@@ -11,6 +11,7 @@ use tests::case::run_text;
 /// Its title wants to end the script it is put into.
 pub(crate) const CASE: &str = r#"title = "A </script><script>alert(1)</script> & \"layer\""
 analysis = "plane_strain"
+supports = [{ line = "right", fixed = ["x", "y"] }]
 
 [mesh]
 columns = [{ n = 1, to = 0.5 }, { n = 1, to = 0.51 }, { n = 1, to = 1.0 }]
@@ -50,9 +51,6 @@ law = "soil"
 formulation = "thin_layer"
 law = "soil"
 
-[[supports]]
-line = "right"
-fixed = ["x", "y"]
 
 [[phase]]
 name = "press"

@@ -227,6 +227,17 @@ pub fn assert_named(test: &str, what: &str) {
     }
 }
 
+/// The value of an `Option`. A test without it ends here: it was passed over.
+#[macro_export]
+macro_rules! or_skip {
+    ($found:expr) => {
+        match $found {
+            Some(found) => found,
+            None => return,
+        }
+    };
+}
+
 #[cfg(test)]
 mod tests {
     use super::{names, summary};

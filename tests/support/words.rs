@@ -23,6 +23,22 @@ fn cell(text: &str) -> &'static str {
     text.trim().replace("\\n", "\n").leak()
 }
 
+/// Named paths from rows `name | segment; segment`, the numbers of a segment between spaces.
+///
+/// # Panics
+/// If a segment does not have N numbers.
+#[expect(clippy::expect_used, reason = "part of the tests")]
+pub fn paths_of<const N: usize>(table: &str) -> Vec<(&'static str, Vec<[f64; N]>)> {
+    let number = |text: &str| text.parse::<f64>().expect("a number");
+    let segment = |text: &str| {
+        let numbers: Vec<f64> = text.split_whitespace().map(number).collect();
+        numbers.try_into().expect("N numbers")
+    };
+    let rows = rows_of(table).into_iter();
+    rows.map(|[name, path]| (name, path.split(';').map(segment).collect()))
+        .collect()
+}
+
 /// A text with the first `from` of each edit `from => to` replaced by `to`. `\n` is the end of a line.
 ///
 /// # Panics

@@ -63,7 +63,7 @@ fn thick_sphere() {
             let variant = format!("{mesh}_nu_{nu}");
             for (wall, r) in [("inner", a), ("outer", b)] {
                 let value = results.last(&variant, wall);
-                results.near(&format!("{variant}, {wall}"), value, u(r), u(r), bound);
+                results.of(&variant).near(wall, value, u(r), u(r), bound);
             }
         }
     }
@@ -101,14 +101,10 @@ fn rigid_disc() {
         ("fine", 2.6e4, 0.3, 0.008),
         ("nearly_incompressible", 2.9998e4, 0.4999, 0.012),
     ] {
+        let of = results.of(variant);
         let ground = Elastic { young, poisson: nu };
         let exact = 4.0 * ground.shear() * radius * w / (1.0 - nu);
-        results.within(
-            variant,
-            results.last(variant, "force") / exact - 1.0,
-            0.0,
-            bound,
-        );
+        results.within(variant, of.last("force") / exact - 1.0, 0.0, bound);
     }
     // Bonded to the ground (Spence 1968): Q = 4 G R w ln(3 − 4ν)/(1 − 2ν).
     let (ground, nu) = (
@@ -132,12 +128,13 @@ fn flexible_disc() {
     let centre = 2.0 * q * a * (1.0 - nu * nu) / young;
     let edge = centre * 2.0 / PI;
     for (variant, bound, of_stress) in [("coarse", 0.02, 0.15), ("fine", 0.007, 0.01)] {
+        let of = results.of(variant);
         // The ground ends at 200 radii: both settle less by about q π a² (1 − ν²)/(π E 200 a), 0.25 % of the centre's.
         results.ends_at(variant, "centre", centre, bound);
         results.ends_at(variant, "edge", edge, bound);
-        let difference = results.last(variant, "centre") - results.last(variant, "edge");
-        results.near(
-            &format!("{variant}, difference"),
+        let difference = of.last("centre") - of.last("edge");
+        of.near(
+            "difference",
             difference,
             centre - edge,
             centre - edge,
@@ -153,12 +150,7 @@ fn flexible_disc() {
             let exact = -q * (1.0 - (1.0 + (a / depth).powi(2)).powf(-1.5));
             (number(row, "stress_22") - exact).abs() / q
         });
-        results.within(
-            &format!("{variant}, stress"),
-            errors.fold(0.0, f64::max),
-            0.0,
-            of_stress,
-        );
+        of.within("stress", errors.fold(0.0, f64::max), 0.0, of_stress);
     }
 }
 
@@ -185,8 +177,9 @@ fn pile_in_half_space() {
         ("nu_0.5_short", 14.6, 0.5),
         ("nu_0.3_long", 40.0, 0.3),
     ] {
+        let of = results.of(variant);
         let exact = stiffness(slender, nu);
-        let value = force / (results.last(variant, "settlement") * shear * r);
+        let value = force / (of.last("settlement") * shear * r);
         results.near(variant, value, exact, exact, 0.1);
     }
     let [coarse, fine] =
@@ -209,7 +202,8 @@ fn gibson_column() {
         ("n40", 0.008),
         ("n80", 0.003),
     ] {
-        let error = results.last(variant, "settlement") / exact - 1.0;
+        let of = results.of(variant);
+        let error = of.last("settlement") / exact - 1.0;
         results.within(variant, error, -bound, 0.0);
         errors.push(error);
     }

@@ -27,14 +27,9 @@ fn layers_with_water() {
         above.sum::<f64>() - WATER * (level - z).max(0.0)
     };
     for variant in ["quads", "plane"] {
+        let of = results.of(variant);
         // Against the settlement that the weight would cause, some 2 cm.
-        results.near(
-            &format!("{variant}, u_y"),
-            results.last(variant, "u_y"),
-            0.0,
-            0.02,
-            ROUND_OFF,
-        );
+        of.near("u_y", of.last("u_y"), 0.0, 0.02, ROUND_OFF);
         let rows = results.rows(variant, "points.csv");
         let errors = rows.iter().map(|row| {
             let layer = layers.iter().find(|layer| layer.0 == row["group"]).unwrap();
@@ -45,8 +40,8 @@ fn layers_with_water() {
             errors.into_iter().map(f64::abs).fold(0.0, f64::max)
         });
         // Of the 140 kPa at the bottom.
-        results.within(
-            &format!("{variant}, stress"),
+        of.within(
+            "stress",
             errors.fold(0.0, f64::max) / 140.0,
             0.0,
             10.0 * ROUND_OFF,
@@ -70,13 +65,8 @@ fn earth_pressure_at_rest() {
         ("surcharge", one, 0.0, 0.0, 40.0),
     ];
     for (variant, ocr, pop, nu, surcharge) in histories {
-        results.near(
-            &format!("{variant}, u_y"),
-            results.last(variant, "u_y"),
-            0.0,
-            0.02,
-            ROUND_OFF,
-        );
+        let of = results.of(variant);
+        of.near("u_y", of.last("u_y"), 0.0, 0.02, ROUND_OFF);
         let rows = results.rows(variant, "points.csv");
         let errors = rows.iter().map(|row| {
             let z = number(row, "y");
@@ -87,8 +77,8 @@ fn earth_pressure_at_rest() {
                 .map(|(component, exact)| number(row, &format!("stress_{component}")) + exact);
             errors.into_iter().map(f64::abs).fold(0.0, f64::max)
         });
-        results.within(
-            &format!("{variant}, stress"),
+        of.within(
+            "stress",
             errors.fold(0.0, f64::max) / 180.0,
             0.0,
             10.0 * ROUND_OFF,
@@ -135,8 +125,9 @@ fn undrained_column() {
     let pores = 2.0 * ground.shear() * (1.0 + nu_u) / (3.0 * (1.0 - 2.0 * nu_u)) - ground.bulk();
     let undrained = ground.oedometric() + pores;
     for variant in ["plane", "axisymmetric"] {
+        let of = results.of(variant);
         for (phase, modulus) in [("load", undrained), ("drain", ground.oedometric())] {
-            let end = |probe| results.end(variant, phase, probe);
+            let end = |probe| of.end(phase, probe);
             let settlement = q * height / modulus;
             let what = format!("{variant}, {phase}");
             // Poisson's ratio of 0.49 takes one digit more.
@@ -172,24 +163,25 @@ fn water_table() {
         ("levels_inside", 0.012),
         ("levels_inside_fine", 1e-3),
     ] {
-        let end = |phase, probe| results.end(variant, phase, probe);
-        results.near(
-            &format!("{variant}, rest"),
+        let of = results.of(variant);
+        let end = |phase, probe| of.end(phase, probe);
+        of.near(
+            "rest",
             end("rest", "settlement"),
             0.0,
             settlement,
             ROUND_OFF * 10.0,
         );
-        results.near(
-            variant,
+        of.near(
+            "",
             end("draw_down", "settlement"),
             settlement,
             settlement,
             bound,
         );
         let weight = 17.0 * 4.0 + 20.0 * 6.0;
-        results.near(
-            &format!("{variant}, weight"),
+        of.near(
+            "weight",
             end("draw_down", "weight"),
             weight,
             weight,
@@ -224,29 +216,21 @@ fn level_ground() {
 fn lake() {
     let results = run("lake");
     for variant in ["quads", "triangles"] {
+        let of = results.of(variant);
         for probe in ["u_x", "u_y"] {
             // Against the millimetre that the slope moved to come to equilibrium.
-            results.near(
-                &format!("{variant}, {probe}"),
-                results.last(variant, probe),
-                0.0,
-                1e-3,
-                1e-11,
-            );
+            of.near(probe, of.last(probe), 0.0, 1e-3, 1e-11);
         }
         let rows = results.rows(variant, "points.csv");
-        let of = |phase| rows.iter().filter(move |row| row["phase"] == phase);
-        let errors = of("rest").zip(of("rise")).flat_map(|(before, after)| {
-            ["stress_11", "stress_22", "stress_33", "stress_12"]
-                .map(|component| (number(before, component) - number(after, component)).abs())
-        });
+        let points = |phase| rows.iter().filter(move |row| row["phase"] == phase);
+        let errors = points("rest")
+            .zip(points("rise"))
+            .flat_map(|(before, after)| {
+                ["stress_11", "stress_22", "stress_33", "stress_12"]
+                    .map(|component| (number(before, component) - number(after, component)).abs())
+            });
         // Effective stresses stay; of the 50 kPa of water that came.
-        results.within(
-            &format!("{variant}, stress"),
-            errors.fold(0.0, f64::max) / 50.0,
-            0.0,
-            1e-11,
-        );
+        of.within("stress", errors.fold(0.0, f64::max) / 50.0, 0.0, 1e-11);
     }
 }
 

@@ -4,6 +4,8 @@ use crate::setup::{Elastic, cases, number, pilum, run};
 use std::f64::consts::PI;
 use tests::case::column;
 use tests::tolerance::{EQUILIBRIUM, ROUND_OFF};
+use tests::words::has;
+use tests::words::words;
 
 #[test]
 fn joint_at_30_degrees() {
@@ -12,48 +14,25 @@ fn joint_at_30_degrees() {
     let stiffness = 1.0 / (1.0 / 3e7 + 1.0 / 1e9);
     let closed = -1.4e-5 * stiffness;
     for variant in ["quads", "triangles", "torn"] {
-        let normal = |phase| results.end(variant, phase, "normal");
+        let of = results.of(variant);
+        let normal = |phase| of.end(phase, "normal");
         let pulled = if variant == "torn" {
             0.0
         } else {
             4e-6 * stiffness
         };
         // Displacements of 1e-5 m are totals of coordinates of 1 m: differences lose no digit in a linear law.
-        results.near(
-            &format!("{variant}, close"),
-            normal("close"),
-            closed,
-            406.0,
-            1e-11,
-        );
-        results.near(
-            &format!("{variant}, pull"),
-            normal("pull"),
-            pulled,
-            406.0,
-            1e-11,
-        );
-        results.near(
-            &format!("{variant}, close again"),
-            normal("close_again"),
-            closed,
-            406.0,
-            1e-11,
-        );
+        of.near("close", normal("close"), closed, 406.0, 1e-11);
+        of.near("pull", normal("pull"), pulled, 406.0, 1e-11);
+        of.near("close again", normal("close_again"), closed, 406.0, 1e-11);
         // The whole joint slides: c A + N tan φ, c lost once it was torn.
         let adhesion = if variant == "torn" { 0.0 } else { 100.0 };
         for (phase, sign) in [("shear", 1.0), ("shear_back", -1.0)] {
             let exact = sign * (adhesion - 0.5 * normal(phase));
-            let shear = results.end(variant, phase, "shear");
-            results.near(
-                &format!("{variant}, {phase}"),
-                shear,
-                exact,
-                300.0,
-                EQUILIBRIUM,
-            );
-            results.near(
-                &format!("{variant}, {phase}, normal"),
+            let shear = of.end(phase, "shear");
+            of.near(phase, shear, exact, 300.0, EQUILIBRIUM);
+            of.near(
+                &format!("{phase}, normal"),
                 normal(phase),
                 closed,
                 406.0,
@@ -74,6 +53,7 @@ fn oblique_interface() {
     // n = (−1, 1)/√2 into the upper block, t = (1, 1)/√2.
     let (normal, shear) = (-(p + q) / 2.0, (q - p) / 2.0);
     for variant in ["quads", "triangles", "stiff", "dilating"] {
+        let of = results.of(variant);
         let (k_n, k_t) = if variant == "stiff" {
             (1e9, 1e9)
         } else {
@@ -87,37 +67,13 @@ fn oblique_interface() {
             0.5 * block.plane_strain(-q, -p) + jump[0],
             3.0 * block.plane_strain(-p, -q) + jump[1],
         ];
-        let end = |probe| results.end(variant, "press", probe);
+        let end = |probe| of.end("press", probe);
         // 1e9 against 1e5: four digits of the displacements are lost to the joint.
         let bound = if variant == "stiff" { 1e-8 } else { 1e-11 };
-        results.near(
-            &format!("{variant}, u_x"),
-            end("u_x"),
-            exact[0],
-            exact[1].abs(),
-            bound,
-        );
-        results.near(
-            &format!("{variant}, u_y"),
-            end("u_y"),
-            exact[1],
-            exact[1].abs(),
-            bound,
-        );
-        results.near(
-            &format!("{variant}, traction n"),
-            end("traction_n"),
-            normal,
-            50.0,
-            bound,
-        );
-        results.near(
-            &format!("{variant}, traction t"),
-            end("traction_t").abs(),
-            -shear,
-            50.0,
-            bound,
-        );
+        of.near("u_x", end("u_x"), exact[0], exact[1].abs(), bound);
+        of.near("u_y", end("u_y"), exact[1], exact[1].abs(), bound);
+        of.near("traction n", end("traction_n"), normal, 50.0, bound);
+        of.near("traction t", end("traction_t").abs(), -shear, 50.0, bound);
         // Sliding: (p − q)/2 = c + (p + q)/2 tan φ, whatever the dilatancy.
         let (c, tan) = (5.0, 20.0_f64.to_radians().tan());
         let limit = (2.0 * c + q * (1.0 + tan)) / (1.0 - tan);
@@ -137,6 +93,7 @@ fn bar_in_hollow_cylinder() {
     let compliance = 1.0 / 5e4 + a / ground.shear() * (b / a).ln();
     // ln r in quadratic elements; the whole curve, elastic and sliding.
     for (variant, bound) in [("n2", 6e-3), ("n4", 6e-4), ("n8", 6e-5)] {
+        let of = results.of(variant);
         let worst = results
             .history(variant, "u")
             .iter()
@@ -145,14 +102,8 @@ fn bar_in_hollow_cylinder() {
             .map(|difference| (difference / strength).abs())
             .fold(0.0, f64::max);
         results.within(variant, worst, 0.0, bound);
-        let last = results.last(variant, "tau").abs();
-        results.near(
-            &format!("{variant}, sliding"),
-            last,
-            strength,
-            strength,
-            EQUILIBRIUM,
-        );
+        let last = of.last("tau").abs();
+        of.near("sliding", last, strength, strength, EQUILIBRIUM);
     }
 }
 
@@ -196,10 +147,7 @@ fn pile_slice() {
     let csv = folder.path().join("point.csv");
     let driver = cases().join("pile_slice/point.toml");
     let text = std::fs::read_to_string(&driver).unwrap();
-    assert!(
-        text.contains(&format!("stiffness = {k_n:.6}")),
-        "{k_n:?} kPa/m"
-    );
+    has(&text, format!("stiffness = {k_n:.6}"));
     pilum(&[
         "point",
         driver.to_str().unwrap(),
@@ -292,22 +240,17 @@ fn curved_interface() {
         ("triangles_2", 0.08, 0.6),
         ("triangles_4", 0.02, 0.2),
     ] {
+        let of = results.of(variant);
         results.ends_at(variant, "inner", inner, bound);
         results.ends_at(variant, "outer", outer, bound);
         for probe in ["sigma_min", "sigma_max"] {
-            results.near(
-                &format!("{variant}, {probe}"),
-                -results.last(variant, probe),
-                q,
-                q,
-                of_traction,
-            );
+            of.near(probe, -of.last(probe), q, q, of_traction);
         }
         // Axes at the nodes are those of the circle.
         for probe in ["tau_min", "tau_max"] {
             if variant.starts_with("quads") {
-                let shear = results.last(variant, probe);
-                results.near(&format!("{variant}, {probe}"), shear, 0.0, q, 1e-12);
+                let shear = of.last(probe);
+                of.near(probe, shear, 0.0, q, 1e-12);
             }
         }
     }
@@ -317,15 +260,10 @@ fn curved_interface() {
 fn activated_interface() {
     let results = run("activated_interface");
     for variant in ["quads", "triangles", "wave"] {
+        let of = results.of(variant);
         for probe in ["u_x", "u_y"] {
             // Against 1 mm under the pressures.
-            results.near(
-                &format!("{variant}, {probe}"),
-                results.last(variant, probe),
-                0.0,
-                1e-3,
-                ROUND_OFF,
-            );
+            of.near(probe, of.last(probe), 0.0, 1e-3, ROUND_OFF);
         }
         let rows = results.rows(variant, "profile.csv");
         let mut points = 0;
@@ -340,7 +278,7 @@ fn activated_interface() {
             points += 1;
         }
         assert!(points >= 6, "{points} points");
-        results.within(&format!("{variant}, traction"), worst, 0.0, 1e-11);
+        of.within("traction", worst, 0.0, 1e-11);
     }
 }
 
@@ -349,23 +287,12 @@ fn activated_interface() {
 #[test]
 fn activated_interfaces_of_a_pile() {
     let results = run("activated_interface/pile.toml");
-    for variant in [
-        "quads",
-        "triangles",
-        "quads_plane",
-        "triangles_plane",
-        "water",
-    ] {
+    for variant in words("quads triangles quads_plane triangles_plane water") {
+        let of = results.of(variant);
         let phase = &results.summary(variant)["phases"][1];
         let share = phase["out_of_balance"].as_f64().unwrap();
-        results.within(&format!("{variant}, out of balance"), share, 0.0, 1e-12);
-        results.near(
-            &format!("{variant}, head"),
-            results.last(variant, "head"),
-            0.0,
-            1e-3,
-            1e-8,
-        );
+        of.within("out of balance", share, 0.0, 1e-12);
+        of.near("head", of.last("head"), 0.0, 1e-3, 1e-8);
         let rows = results.rows(variant, "profile.csv");
         // Upright, inclined, round.
         let (mut points, mut worst) = ([0; 3], [0.0_f64; 3]);
@@ -406,7 +333,7 @@ fn activated_interfaces_of_a_pile() {
             ("inclined", worst[1], 1e-11),
             ("round", worst[2], 2e-4),
         ] {
-            results.within(&format!("{variant}, {part}"), worst, 0.0, bound);
+            of.within(part, worst, 0.0, bound);
         }
     }
 }
@@ -420,13 +347,14 @@ fn closed_crack() {
     let most = 4.0 * (1.0 - nu * nu) * driving * half / young;
     // Next to the tips, where the slip grows as a root, and in the middle; the square ends at 40 half-lengths.
     for (variant, bound, of_middle) in [("coarse", 0.1, 0.03), ("fine", 0.06, 0.01)] {
+        let of = results.of(variant);
         let rows = results.rows(variant, "profile.csv");
         let middle = rows
             .iter()
             .find(|row| number(row, "x").abs() < 1e-9)
             .unwrap();
         let slip = number(middle, "jump_t").abs();
-        results.near(&format!("{variant}, middle"), slip, most, most, of_middle);
+        of.near("middle", slip, most, most, of_middle);
         let errors = rows.iter().map(|row| {
             let exact = most * (half - number(row, "x").powi(2)).max(0.0).sqrt();
             (number(row, "jump_t").abs() - exact).abs() / most

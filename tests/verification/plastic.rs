@@ -15,6 +15,7 @@ fn cylinder_mohr_coulomb() {
         ("not_dilating_n16", 30.0, 2e-4),
         ("tresca_n16", 0.0, 2e-4),
     ] {
+        let of = results.of(variant);
         let (sin, cos) = phi.to_radians().sin_cos();
         // σ_1 = n σ_3 + y, compression positive: radial and hoop stress.
         let (n, y) = ((1.0 + sin) / (1.0 - sin), 2.0 * 50.0 * cos / (1.0 - sin));
@@ -43,7 +44,7 @@ fn cylinder_mohr_coulomb() {
             .map(|(p, u)| (p - pressure(radius(u))).abs() / limit)
             .fold(0.0, f64::max);
         // The front of yielding lies inside an element.
-        results.within(&format!("{variant}, course"), worst, 0.0, 10.0 * bound);
+        of.within("course", worst, 0.0, 10.0 * bound);
         results.ends_at(variant, "pressure", limit, bound);
     }
 }
@@ -94,7 +95,8 @@ fn strip_on_tresca() {
     let results = run_some("strip_on_tresca", &variants);
     // Elements of displacements are stiffer than the ground, at the edge above all.
     for (variant, bound) in variants.into_iter().zip([0.07, 0.02, 0.02]) {
-        let error = results.last(variant, "pressure") / (2.0 + PI) - 1.0;
+        let of = results.of(variant);
+        let error = of.last("pressure") / (2.0 + PI) - 1.0;
         results.within(variant, error, 0.0, bound);
     }
 }
@@ -110,12 +112,8 @@ fn circular_footing() {
         ("rough_n6", 6.05, 0.14),
         ("rough_n12", 6.05, 0.03),
     ] {
-        results.within(
-            variant,
-            results.last(variant, "pressure") / exact - 1.0,
-            0.0,
-            bound,
-        );
+        let of = results.of(variant);
+        results.within(variant, of.last("pressure") / exact - 1.0, 0.0, bound);
     }
 }
 
@@ -129,12 +127,8 @@ fn strip_on_friction() {
         ("n_c_20", n_c(20.0), 0.03),
         ("n_q_30", n_q(30.0), 0.03),
     ] {
-        results.within(
-            variant,
-            results.last(variant, "pressure") / exact - 1.0,
-            0.0,
-            bound,
-        );
+        let of = results.of(variant);
+        results.within(variant, of.last("pressure") / exact - 1.0, 0.0, bound);
     }
 }
 
@@ -148,12 +142,8 @@ fn strip_n_gamma() {
         ("rough_n8", 14.754, 0.08),
         ("smooth_n8", 7.653, 0.05),
     ] {
-        results.within(
-            variant,
-            results.last(variant, "pressure") / exact - 1.0,
-            0.0,
-            bound,
-        );
+        let of = results.of(variant);
+        results.within(variant, of.last("pressure") / exact - 1.0, 0.0, bound);
     }
 }
 

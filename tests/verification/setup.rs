@@ -134,6 +134,52 @@ impl Results {
     }
 }
 
+/// One variant among the results of a case.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Variant<'r> {
+    results: &'r Results,
+    name: &'r str,
+}
+
+impl Results {
+    /// The results of a variant.
+    pub(crate) fn of<'r>(&'r self, name: &'r str) -> Variant<'r> {
+        Variant {
+            results: self,
+            name,
+        }
+    }
+}
+
+impl Variant<'_> {
+    /// [`Results::last`].
+    pub(crate) fn last(&self, probe: &str) -> f64 {
+        self.results.last(self.name, probe)
+    }
+
+    /// [`Results::end`].
+    pub(crate) fn end(&self, phase: &str, probe: &str) -> f64 {
+        self.results.end(self.name, phase, probe)
+    }
+
+    fn what(&self, what: &str) -> String {
+        format!("{}, {what}", self.name)
+    }
+
+    /// [`Results::near`].
+    #[track_caller]
+    pub(crate) fn near(&self, what: &str, value: f64, exact: f64, scale: f64, bound: f64) {
+        let what = self.what(what);
+        self.results.near(&what, value, exact, scale, bound);
+    }
+
+    /// [`Results::within`].
+    #[track_caller]
+    pub(crate) fn within(&self, what: &str, error: f64, least: f64, most: f64) {
+        self.results.within(&self.what(what), error, least, most);
+    }
+}
+
 /// A number of a row.
 pub(crate) fn number(row: &Row, column: &str) -> f64 {
     row[column].parse().unwrap()

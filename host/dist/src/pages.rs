@@ -150,6 +150,8 @@ mod tests {
         pairs.map(|(a, b)| (a.into(), b.into())).into()
     }
 
+    const LEFT: &str = "[w](https://a.b/) [h](#here) a[i](x)";
+
     #[test]
     fn links_lead_to_where_files_lie() {
         let repository = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."));
@@ -161,10 +163,7 @@ mod tests {
             ),
             ("see [the [test]](../../tests/README.md)", "see the [test]"),
             ("![p](../../Cargo.toml) q", "p q"),
-            (
-                "[w](https://a.b/) [h](#here) a[i](x)",
-                "[w](https://a.b/) [h](#here) a[i](x)",
-            ),
+            (LEFT, LEFT),
         ] {
             let page = Path::new("host/docs/a.md");
             assert_eq!(links(line, page, &places(), repository), moved);
@@ -175,17 +174,20 @@ mod tests {
     fn commands_are_those_of_the_installed_program() {
         for (line, moved) in [
             (
-                "cargo run --release -- run cases/b   # x\n",
-                "pilum run cases/b   # x\n",
+                "cargo run --release -- run cases/b   # x",
+                "pilum run cases/b   # x",
             ),
-            ("cc -o a tests/c.f90\n", "cc -o a cases/b/c.f90\n"),
+            ("cc -o a tests/c.f90", "cc -o a cases/b/c.f90"),
             (
-                "A=1 cargo test   # all\n",
-                "A=1 cargo test   # in the repository: all\n",
+                "A=1 cargo test   # all",
+                "A=1 cargo test   # in the repository: all",
             ),
-            ("tests/run.sh\n", "tests/run.sh   # in the repository\n"),
+            ("tests/run.sh", "tests/run.sh   # in the repository"),
         ] {
-            assert_eq!(command(line, &places()), moved);
+            assert_eq!(
+                command(&format!("{line}\n"), &places()),
+                format!("{moved}\n")
+            );
         }
     }
 }

@@ -83,52 +83,6 @@ fn a_block_slides_at_its_friction() {
     }
 }
 
-/// Uniaxial strain of an elastic column of triangles: σ = M ε to round-off, since a linear field is in
-/// their space.
-#[test]
-fn triangles_carry_a_linear_field_exactly() {
-    let ring = |analysis| {
-        let mut mesh = triangles(Mesh::grid(&[0.0, 0.3, 1.0], &[0.0, 0.8, 2.0], |_, _| 0));
-        name_sides(&mut mesh);
-        let mut problem = Problem::new(analysis, mesh);
-        let hypothesis = match analysis {
-            Analysis::PlaneStrain => Hypothesis::PlaneStrain,
-            Analysis::Axisymmetric => Hypothesis::Axisymmetric,
-        };
-        problem.groups = vec![ElementGroup::new(
-            "soil",
-            Formulation::Solid,
-            elastic(hypothesis),
-        )];
-        problem.supports = vec![
-            held("left", &[Axis::X]),
-            held("right", &[Axis::X]),
-            held("bottom", &[Axis::Y]),
-        ];
-        let mut press = Phase::new("press", 1);
-        press.displacement = vec![moved("top", None, Some(-0.02))];
-        problem.phases = vec![press];
-        let mut simulation = Simulation::new(problem).unwrap();
-        simulation.run(&mut ()).unwrap();
-        (simulation.reaction_of("top").unwrap()[1], simulation)
-    };
-    let modulus = E * (1.0 - NU) / ((1.0 + NU) * (1.0 - 2.0 * NU));
-    let stress = -modulus * 0.02 / 2.0;
-    let (plane, simulation) = ring(Analysis::PlaneStrain);
-    assert!((plane - stress).abs() < 1e-10 * stress.abs(), "{plane}");
-    let group = &simulation.groups()[0];
-    for point in 0..group.kinematics.n_points() {
-        let found = group.global_stress(point).unwrap();
-        assert!(
-            (found[1] - stress).abs() < 1e-10 * stress.abs(),
-            "{found:?}"
-        );
-    }
-    let (turn, _) = ring(Analysis::Axisymmetric);
-    let area = std::f64::consts::PI;
-    assert!((turn - stress * area).abs() < 1e-10 * (stress * area).abs());
-}
-
 /// From one state twice, and from a copy of it in another simulation: the same bits.
 #[test]
 fn a_state_is_gone_on_from_twice() {

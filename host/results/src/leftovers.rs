@@ -94,21 +94,3 @@ fn pictures(folder: &Path) -> Vec<String> {
     names.retain(|name| Path::new(name).extension() == Some(OsStr::new("svg")));
     names
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn fields_are_known_by_their_numbers() {
-        assert!(is_field("fields_00000.vtu") && is_field("fields_123456.vtu"));
-        for other in [
-            "fields_.vtu",
-            "fields_1.vtu",
-            "fields_0000a.vtu",
-            "fields_00000.vtu.bak",
-        ] {
-            assert!(!is_field(other), "{other}");
-        }
-    }
-}

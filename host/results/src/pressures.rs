@@ -75,16 +75,3 @@ impl Pressure {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_quantity_is_found_by_its_name() {
-        for quantity in Pressure::ALL {
-            assert_eq!(Pressure::named(quantity.name()), Some(quantity));
-        }
-        assert_eq!(Pressure::named("stress_11"), None);
-    }
-}

@@ -15,23 +15,3 @@ pub(crate) fn stratified(n: usize, random: &mut Random) -> Vec<f64> {
     };
     order.into_iter().map(inside).collect()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn each_part_has_one_number() {
-        for (n, seed) in [(1, 0), (7, 3), (100, 42), (1000, u64::MAX >> 1)] {
-            let mut seen = vec![0; n];
-            for x in stratified(n, &mut Random::of(seed, 1)) {
-                seen[(x * n as f64) as usize] += 1;
-            }
-            assert!(seen.iter().all(|&count| count == 1), "{n} {seed}");
-        }
-        let of = |seed, dimension| stratified(9, &mut Random::of(seed, dimension));
-        assert_eq!(of(7, 0), of(7, 0));
-        assert_ne!(of(7, 0), of(8, 0));
-        assert_ne!(of(7, 0), of(7, 1));
-    }
-}

@@ -57,130 +57,45 @@ fn lines(p: &Parameters, psi: f64) -> [f64; 2] {
     ]
 }
 
-/// A joint on a path.
-#[derive(Clone, Copy, Debug)]
-struct Walker {
-    law: CriticalStateJoint,
-    traction: [f64; 2],
-    state: State,
-    jump: [f64; 2],
+type Walker = walk::Walker<CriticalStateJoint>;
+
+fn begin(p: Parameters, traction: [f64; 2]) -> Walker {
+    Walker::new(joint(p), traction)
 }
 
-impl Walker {
-    fn new(p: Parameters, traction: [f64; 2]) -> Self {
-        let law = joint(p);
-        Self {
-            law,
-            traction,
-            state: law.initial_state(&traction).unwrap(),
-            jump: [0.0; 2],
-        }
+fn slip_in(mut walker: Walker, stiffness: f64, slip: f64, n: u32) -> Walker {
+    for _ in 0..n {
+        walker.slip(stiffness, slip / f64::from(n));
     }
-
-    fn respond(
-        &self,
-        jump_increment: [f64; 2],
-        tangent: Tangent,
-    ) -> Result<InterfaceResponse<State>, Failure> {
-        let point = InterfacePoint {
-            jump: self.jump,
-            jump_increment,
-            traction: self.traction,
-            state: self.state,
-            time: 0.0,
-            time_increment: 1.0,
-            step_time: 0.0,
-        };
-        self.law.update(&point, tangent)
-    }
-
-    fn step(&mut self, jump_increment: [f64; 2]) -> [[f64; 2]; 2] {
-        let end = self.respond(jump_increment, Tangent::Consistent).unwrap();
-        for i in 0..2 {
-            self.jump[i] += jump_increment[i];
-        }
-        self.traction = end.traction;
-        self.state = end.state;
-        end.tangent
-    }
-
-    /// Slips against a normal spring, `Δσ_n` = stiffness · `Δ[u_n]`: Newton's method with bisection.
-    fn slip(&mut self, stiffness: f64, slip: f64) {
-        let sigma = -self.traction[0];
-        let (mut low, mut high) = (-2.0 * slip.abs(), 2.0 * slip.abs());
-        let mut opening = 0.0;
-        for _ in 0..100 {
-            let end = self.respond([opening, slip], Tangent::Consistent).unwrap();
-            let residual = -end.traction[0] - sigma - stiffness * opening;
-            if residual.abs() < 1e-12 * sigma {
-                break;
-            }
-            if residual > 0.0 {
-                low = opening;
-            } else {
-                high = opening;
-            }
-            opening += residual / (end.tangent[0][0] + stiffness);
-            if !(opening > low && opening < high) {
-                opening = 0.5 * (low + high);
-            }
-        }
-        self.step([opening, slip]);
-    }
-
-    fn slip_in(mut self, stiffness: f64, slip: f64, n: u32) -> Self {
-        for _ in 0..n {
-            self.slip(stiffness, slip / f64::from(n));
-        }
-        self
-    }
-
-    fn ratio(&self) -> f64 {
-        -self.traction[1] / self.traction[0]
-    }
-
-    fn psi(&self) -> f64 {
-        self.state.void_ratio - critical_void_ratio(&self.law.parameters, -self.traction[0])
-    }
+    walker
 }
 
-#[test]
-fn dense_and_loose_sand_reach_one_critical_state_at_constant_normal_stress() {
-    let m = critical_friction(&SAND);
-    for sigma in [20.0, 100.0, 800.0] {
-        let critical = critical_void_ratio(&SAND, sigma);
-        for void_ratio in [0.62, 0.75, 0.9, 1.0] {
-            for sign in [1.0, -1.0] {
-                let walker = Walker::new(of_void_ratio(void_ratio), [-sigma, 0.0]);
-                let walker = walker.slip_in(0.0, sign * 0.5, 500);
-                assert_relative_eq!(walker.ratio(), sign * m, max_relative = 1e-6);
-                assert_relative_eq!(walker.state.void_ratio, critical, max_relative = 1e-6);
-                // (1 + e) has grown with the layer, which springs have not changed.
-                let growth = (1.0 + critical) / (1.0 + void_ratio);
-                let moved = SAND.thickness * growth.ln();
-                assert_relative_eq!(walker.jump[0], moved, max_relative = 1e-4);
-            }
-        }
-    }
+fn ratio(walker: &Walker) -> f64 {
+    -walker.traction[1] / walker.traction[0]
+}
+
+fn psi(walker: &Walker) -> f64 {
+    let p = &walker.law.parameters;
+    walker.state.void_ratio - critical_void_ratio(p, -walker.traction[0])
 }
 
 #[test]
 fn the_peak_and_its_dilation_are_those_of_the_state() {
     for void_ratio in [0.6, 0.7, 0.8] {
-        let mut walker = Walker::new(of_void_ratio(void_ratio), [-100.0, 0.0]);
+        let mut walker = begin(of_void_ratio(void_ratio), [-100.0, 0.0]);
         let (mut peak, mut rate) = (walker, 0.0);
         for _ in 0..1000 {
             let before = walker;
             walker.slip(0.0, 2e-6);
-            if walker.ratio() > peak.ratio() {
+            if ratio(&walker) > ratio(&peak) {
                 peak = walker;
                 rate = (walker.jump[0] - before.jump[0]) / 2e-6;
             }
         }
-        assert!(peak.ratio() > 1.01 * walker.ratio());
-        let [friction, neutral] = lines(&SAND, peak.psi());
+        assert!(ratio(&peak) > 1.01 * ratio(&walker));
+        let [friction, neutral] = lines(&SAND, psi(&peak));
         // Off by the change of ψ over an increment, 2e-6 m · 0.5/5e-3 m.
-        assert_relative_eq!(peak.ratio(), friction, max_relative = 1e-3);
+        assert_relative_eq!(ratio(&peak), friction, max_relative = 1e-3);
         assert_relative_eq!(rate, friction - neutral, max_relative = 2e-3);
     }
 }
@@ -195,52 +110,14 @@ fn a_thick_layer_hardens_and_dilates_as_the_closed_form_says() {
             ..of_void_ratio(void_ratio)
         };
         let [peak, neutral] = lines(&p, void_ratio - critical_void_ratio(&p, 100.0));
-        let walker = Walker::new(p, [-100.0, 0.0]).slip_in(0.0, 2e-3, n);
+        let walker = slip_in(begin(p, [-100.0, 0.0]), 0.0, 2e-3, n);
         let xi = 2e-3 - walker.traction[1] / p.shear_stiffness;
         let left = (-xi / p.hardening_slip).exp();
         let mu = peak + (p.elastic_range - peak) * left;
-        assert_relative_eq!(walker.ratio(), mu, max_relative = 1e-9);
+        assert_relative_eq!(ratio(&walker), mu, max_relative = 1e-9);
         let lag = p.hardening_slip * (1.0 - left);
         let v = 0.6 * ((peak - neutral) * xi + (p.elastic_range - peak) * lag);
         assert_relative_eq!(walker.jump[0], v, max_relative = 1e-8);
-    }
-}
-
-#[test]
-fn constant_volume_ends_at_the_critical_stress_of_the_void_ratio() {
-    for void_ratio in [0.75, 0.8, 0.84] {
-        let p = Parameters {
-            dilatancy_factor: 0.1,
-            ..of_void_ratio(void_ratio)
-        };
-        let mut walker = Walker::new(p, [-100.0, 0.0]);
-        for _ in 0..2000 {
-            walker.step([0.0, 1e-3]);
-        }
-        // e = e_c0 exp(−(3 σ/h_s)^n), solved for σ.
-        let ratio = p.critical_void_ratio / void_ratio;
-        let sigma = p.granular_hardness / 3.0 * ratio.ln().powf(1.0 / p.hardness_exponent);
-        assert_relative_eq!(-walker.traction[0], sigma, max_relative = 1e-6);
-        assert_relative_eq!(walker.ratio(), critical_friction(&p), max_relative = 1e-8);
-        assert_relative_eq!(walker.state.void_ratio, void_ratio, max_relative = 1e-12);
-    }
-}
-
-#[test]
-fn constant_stiffness_ends_where_spring_and_critical_line_meet() {
-    for (void_ratio, stiffness) in [(0.65, 1e5), (0.7, 1e6), (0.95, 1e4)] {
-        let walker = Walker::new(of_void_ratio(void_ratio), [-100.0, 0.0]);
-        let walker = walker.slip_in(stiffness, 0.5, 1000);
-        let sigma = -walker.traction[0];
-        let opening = (sigma - 100.0) / stiffness;
-        let e = (1.0 + void_ratio) * (opening / SAND.thickness).exp() - 1.0;
-        assert_relative_eq!(e, critical_void_ratio(&SAND, sigma), max_relative = 1e-7);
-        assert_relative_eq!(
-            walker.ratio(),
-            critical_friction(&SAND),
-            max_relative = 1e-6
-        );
-        assert!((sigma > 100.0) == (void_ratio < 0.9), "{sigma}");
     }
 }
 
@@ -297,7 +174,7 @@ fn quadrature(p: &Parameters, stiffness: f64, reversals: &[f64]) -> Vec<[f64; 3]
 
 /// The largest relative distance of the law from the quadrature, in increments of 1/n.
 fn distance(p: &Parameters, stiffness: f64, reversals: &[f64], n: u32) -> f64 {
-    let mut walker = Walker::new(*p, [-100.0, 0.0]);
+    let mut walker = begin(*p, [-100.0, 0.0]);
     let mut largest = 0.0_f64;
     for (goal, truth) in reversals.iter().zip(quadrature(p, stiffness, reversals)) {
         let slip = goal - walker.jump[1];
@@ -306,7 +183,7 @@ fn distance(p: &Parameters, stiffness: f64, reversals: &[f64], n: u32) -> f64 {
                 walker.step([0.0, slip / f64::from(n)]);
             }
         } else {
-            walker = walker.slip_in(stiffness, slip, n);
+            walker = slip_in(walker, stiffness, slip, n);
         }
         let [normal, shear] = walker.traction;
         let found = [-normal, shear, walker.state.void_ratio];
@@ -352,11 +229,11 @@ fn monotonic_and_cyclic_paths_follow_the_quadrature_of_the_rates() {
 #[test]
 fn density_and_stress_move_the_peak() {
     let peak = |void_ratio, sigma: f64| {
-        let mut walker = Walker::new(of_void_ratio(void_ratio), [-sigma, 0.0]);
+        let mut walker = begin(of_void_ratio(void_ratio), [-sigma, 0.0]);
         let mut peak = 0.0_f64;
         for _ in 0..200 {
             walker.slip(0.0, 2e-5);
-            peak = peak.max(walker.ratio());
+            peak = peak.max(ratio(&walker));
         }
         peak
     };
@@ -369,7 +246,7 @@ fn density_and_stress_move_the_peak() {
 
 #[test]
 fn opens_in_tension_and_closes_where_contact_was_lost() {
-    let mut walker = Walker::new(SAND, [-100.0, 0.0]);
+    let mut walker = begin(SAND, [-100.0, 0.0]);
     walker.step([100.0 / 5e6 + 3e-5, 0.0]);
     assert_eq!(walker.traction, [0.0; 2]);
     assert_relative_eq!(walker.state.gap, 3e-5, max_relative = 1e-10);
@@ -391,7 +268,7 @@ fn opens_in_tension_and_closes_where_contact_was_lost() {
 #[test]
 fn faces_that_touch_without_stress_do_not_slip() {
     // Loose sand at constant volume contracts until nothing is left.
-    let mut walker = Walker::new(of_void_ratio(1.0), [-100.0, 0.0]);
+    let mut walker = begin(of_void_ratio(1.0), [-100.0, 0.0]);
     for _ in 0..100 {
         walker.step([0.0, 1e-4]);
     }
@@ -418,7 +295,7 @@ fn a_trial_in_tension_does_not_open_what_dilation_presses() {
         shear_stiffness: 1e9,
         ..SAND
     };
-    let mut walker = Walker::new(p, [-100.0, 0.0]);
+    let mut walker = begin(p, [-100.0, 0.0]);
     for _ in 0..40 {
         walker.slip(0.0, 1e-4);
         assert_relative_eq!(walker.traction[0], -100.0, max_relative = 1e-6);
@@ -429,7 +306,7 @@ fn a_trial_in_tension_does_not_open_what_dilation_presses() {
 #[test]
 fn a_sheared_initial_state_lies_on_the_surface() {
     for (ratio, alpha) in [(0.4, 0.38), (-0.4, -0.38), (0.01, 0.0), (1.5, 1.48)] {
-        let mut walker = Walker::new(SAND, [-100.0, 100.0 * ratio]);
+        let mut walker = begin(SAND, [-100.0, 100.0 * ratio]);
         assert_abs_diff_eq!(walker.state.back_stress_ratio, alpha, epsilon = 1e-14);
         let before = walker;
         walker.step([0.0; 2]);
@@ -440,7 +317,7 @@ fn a_sheared_initial_state_lies_on_the_surface() {
     }
     // Without pressure there is no ratio.
     for traction in [[0.0, 5.0], [3.0, 5.0]] {
-        let mut walker = Walker::new(SAND, traction);
+        let mut walker = begin(SAND, traction);
         walker.step([0.0; 2]);
         assert_eq!(walker.traction, [0.0; 2]);
     }
@@ -456,7 +333,7 @@ fn refuses_what_does_not_go_together() {
         CriticalStateJoint::new(p).unwrap_err().parameter,
         "elastic_range"
     );
-    let mut walker = Walker::new(SAND, [-100.0, 0.0]);
+    let mut walker = begin(SAND, [-100.0, 0.0]);
     walker.state.gap = -1e-3;
     let failure = walker.respond([0.0; 2], Tangent::None).unwrap_err();
     assert!(failure.reason().starts_with("gap"), "{failure:?}");
@@ -471,7 +348,7 @@ fn refuses_what_does_not_go_together() {
 
 #[test]
 fn the_elastic_operator_is_diagonal_in_every_state() {
-    let mut walker = Walker::new(SAND, [-100.0, 0.0]);
+    let mut walker = begin(SAND, [-100.0, 0.0]);
     for jump in [[0.0, 1e-6], [0.0, 1e-3], [1e-1, 0.0], [-2e-1, 1e-3]] {
         let end = walker.respond(jump, Tangent::Elastic).unwrap();
         assert_eq!(end.tangent, [[5e6, 0.0], [0.0, 2e6]]);

@@ -17,6 +17,7 @@ use crate::{Mepi, MepiSoftening, State, mepi, mepi_softening};
 use abi::substepping::SchemeParameters;
 use abi::{Failure, InterfaceLaw, InterfacePoint, InterfaceResponse, Tangent};
 use truth::Truth;
+use walk::Random;
 
 /// Table IV with the reference pressure that makes it dilate.
 const TABLE_4: Common = Common {
@@ -227,29 +228,5 @@ impl<'a, L: InterfaceLaw<State = State>> Walker<'a, L> {
             }
         }
         panic!("no equilibrium at {:?} {:?}", self.traction, self.state);
-    }
-}
-
-/// A linear congruential generator (Knuth's MMIX constants).
-struct Random(u64);
-
-impl Random {
-    /// Uniform in [0, 1).
-    fn unit(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Uniform in [a, b).
-    fn between(&mut self, a: f64, b: f64) -> f64 {
-        a + (b - a) * self.unit()
-    }
-
-    /// Uniform in the logarithm.
-    fn decades(&mut self, a: f64, b: f64) -> f64 {
-        a * (b / a).powf(self.unit())
     }
 }

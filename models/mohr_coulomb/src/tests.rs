@@ -16,6 +16,7 @@ use crate::{MohrCoulomb, Parameters, State};
 use abi::substepping::SchemeParameters;
 use abi::{ContinuumLaw as _, SolidPoint, SolidResponse, Tangent};
 use nalgebra::{Matrix3, Vector3};
+use walk::Random;
 
 /// E = 25e3 kPa and ν = 1/4, so that λ = G = 1e4 kPa; φ = 30°, ψ = 0, c cos φ = 10 kPa, so that the
 /// yield function is 3/4 s₁ − 1/4 s₃ − 10 and the apex is at 20 kPa.
@@ -132,63 +133,42 @@ fn size<const N: usize>(a: &[f64; N]) -> f64 {
     distance(a, &[0.0; N])
 }
 
-/// Uniform numbers in [0, 1): a 64-bit linear congruential generator (Knuth's constants).
-struct Random(u64);
+fn any_angles(random: &mut Random) -> [f64; 3] {
+    std::array::from_fn(|_| random.between(0.0, 6.3))
+}
 
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+/// Principal values about as large as the strength, some of them equal.
+fn principal(random: &mut Random, scale: f64) -> [f64; 3] {
+    let mean = random.between(-3.0, 2.0) * scale;
+    let reach = random.one_of(&[0.1, 1.0, 5.0]) * scale;
+    let mut s: [f64; 3] = std::array::from_fn(|_| mean + random.between(-reach, reach));
+    match random.one_of(&[0, 1, 2, 3, 4, 5]) {
+        0 => s[1] = s[0],
+        1 => s[2] = s[0],
+        2 => s[2] = s[1],
+        _ => {}
     }
+    s
+}
 
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.next()
-    }
-
-    fn one_of<T: Copy>(&mut self, choices: &[T]) -> T {
-        choices[(self.next() * choices.len() as f64) as usize]
-    }
-
-    fn angles(&mut self) -> [f64; 3] {
-        std::array::from_fn(|_| self.between(0.0, 6.3))
-    }
-
-    /// Principal values about as large as the strength, some of them equal.
-    fn principal(&mut self, scale: f64) -> [f64; 3] {
-        let mean = self.between(-3.0, 2.0) * scale;
-        let reach = self.one_of(&[0.1, 1.0, 5.0]) * scale;
-        let mut s: [f64; 3] = std::array::from_fn(|_| mean + self.between(-reach, reach));
-        match self.one_of(&[0, 1, 2, 3, 4, 5]) {
-            0 => s[1] = s[0],
-            1 => s[2] = s[0],
-            2 => s[2] = s[1],
-            _ => {}
-        }
-        s
-    }
-
-    /// Parameters whose strength is of the order of `scale`, special values included.
-    fn parameters(&mut self, angles: &[f64], scale: f64) -> Parameters {
-        let friction_angle = self.one_of(angles);
-        let cohesion = if friction_angle > 0.0 {
-            self.one_of(&[0.0, 0.3, 1.0])
-        } else {
-            1.0
-        };
-        let apex = cohesion * (90.0 - friction_angle).to_radians().tan();
-        let share = self.one_of(&[f64::NAN, f64::NAN, 0.0, 0.3, 0.9, 1.0]);
-        Parameters {
-            young_modulus: 10_f64.powf(self.between(0.0, 9.0)),
-            poisson_ratio: self.one_of(&[-0.9, 0.0, 0.2, 0.35, 0.499]),
-            cohesion: cohesion * scale,
-            friction_angle,
-            dilatancy_angle: friction_angle * self.one_of(&[0.0, 0.0, 0.4, 1.0]),
-            tensile_strength: share * apex.min(3.0) * scale,
-            scheme: IMPLICIT,
-            relaxation_time: 0.0,
-        }
+/// Parameters whose strength is of the order of `scale`, special values included.
+fn parameters(random: &mut Random, angles: &[f64], scale: f64) -> Parameters {
+    let friction_angle = random.one_of(angles);
+    let cohesion = if friction_angle > 0.0 {
+        random.one_of(&[0.0, 0.3, 1.0])
+    } else {
+        1.0
+    };
+    let apex = cohesion * (90.0 - friction_angle).to_radians().tan();
+    let share = random.one_of(&[f64::NAN, f64::NAN, 0.0, 0.3, 0.9, 1.0]);
+    Parameters {
+        young_modulus: 10_f64.powf(random.between(0.0, 9.0)),
+        poisson_ratio: random.one_of(&[-0.9, 0.0, 0.2, 0.35, 0.499]),
+        cohesion: cohesion * scale,
+        friction_angle,
+        dilatancy_angle: friction_angle * random.one_of(&[0.0, 0.0, 0.4, 1.0]),
+        tensile_strength: share * apex.min(3.0) * scale,
+        scheme: IMPLICIT,
+        relaxation_time: 0.0,
     }
 }

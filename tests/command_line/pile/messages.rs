@@ -4,6 +4,7 @@ use super::{BAR, PILE, rows, run, value};
 use crate::program::{BAD_INPUT, DONE, NO_EQUILIBRIUM, Place, refuses_file};
 use serde_json::Value;
 use std::f64::consts::PI;
+use tests::words::has;
 use tests::words::{edited, rows_of};
 
 /// Without normal stress, and without strength against tension, its sign in a last bit would decide where the bar holds.
@@ -108,10 +109,7 @@ fn a_figure_along_the_pile_is_drawn_or_told_what_is_wrong() {
     };
     let (place, _) = run(&(PILE.to_owned() + &figure("along_pile = {}", "axial_force")));
     let drawn = place.read("out/forces.svg");
-    assert!(
-        drawn.contains("pull, -"),
-        "a curve for the end of a phase, by its load"
-    );
+    has(&drawn, "pull, -");
     let without = PILE[..PILE.rfind("[pile]").unwrap()].to_owned();
     for (text, along, x, says) in [
         (
@@ -130,8 +128,7 @@ fn a_figure_along_the_pile_is_drawn_or_told_what_is_wrong() {
     ] {
         let place = Place::new();
         place.write("pile.toml", text.to_owned() + &figure(along, x));
-        let outcome = place.run(&["run", "pile.toml"]);
-        assert_eq!(outcome.code, Some(BAD_INPUT), "{says}: {}", outcome.stderr);
+        let outcome = place.run(&["run", "pile.toml"]).ended(BAD_INPUT);
         outcome.shows(says);
     }
 }
@@ -163,12 +160,13 @@ displacement = [{ line = "head", z = -0.09 }] => force = [{ line = "head", z = -
             );
         }
         place.write("pile.toml", text);
-        let outcome = place.run(&["run", "pile.toml", "--out", "out", "--dry-run"]);
-        assert_eq!(outcome.code, Some(DONE), "{edit}: {}", outcome.stderr);
+        let outcome = place
+            .run(&["run", "pile.toml", "--out", "out", "--dry-run"])
+            .ended(DONE);
         if says == "-" {
-            assert!(!outcome.says("[pile]:"), "{edit}: {}", outcome.stderr);
+            outcome.hides("[pile]:");
         } else {
-            assert!(outcome.says(says), "{edit}: {says}\n{}", outcome.stderr);
+            outcome.shows(says);
         }
     }
 }
@@ -210,10 +208,8 @@ fn forces_out_of_balance_are_told_as_a_share_of_the_largest_load() {
         "{:.1} % of its largest load, {largest:.1} kN",
         100.0 * left / largest
     );
-    assert!(
-        line.contains(&format!("{left:.2} kN")) && line.contains(&share),
-        "{line}, {share}"
-    );
+    has(&line, format!("{left:.2} kN"));
+    has(&line, &share);
     let push = phases.iter().find(|phase| phase["name"] == "push");
     let said = format!("phase `push`</dt><dd>{:.2} kN", residual(push.unwrap()));
     let report = place.read("out/report.html");

@@ -3,6 +3,7 @@
 use super::{COLUMN, HARDENING, Row, history, number, studied};
 use crate::program::{NO_EQUILIBRIUM, Outcome, Place, edited, refuses};
 use crate::troubled;
+use tests::or_skip;
 
 #[test]
 fn refuses_accuracies_that_are_none() {
@@ -67,25 +68,14 @@ fn an_accuracy_that_was_asked_for_is_reached() {
 /// A case whose layer softens along its path, explicitly, and refuses increments of less time than it is
 /// compiled with: of 8 s in 8 increments.
 fn softening(first: &str) -> String {
-    let edits = [
-        ("limit = 1.0e-6", "limit = 1.0"),
-        ("analysis", &format!("{first}\nanalysis")),
-        (
-            "increments = 2\npressure",
-            // Four, so that each phase has three different ones among a quarter, half and all of them.
-            "increments = 4\ntime = 100.0\npressure",
-        ),
-        (
-            "increments = 2\ndisplacement",
-            "increments = 8\ntime = 8.0\ndisplacement",
-        ),
-    ];
-    edits
-        .iter()
-        .fold(troubled::case("cut"), |text, (from, to)| {
-            assert!(text.contains(from), "the case does not contain {from:?}");
-            text.replacen(from, to, 1)
-        })
+    // Four, so that each phase has three different ones among a quarter, half and all of them.
+    let edits = format!(
+        r"limit = 1.0e-6 => limit = 1.0
+analysis => {first}\nanalysis
+increments = 2\npressure => increments = 4\ntime = 100.0\npressure
+increments = 2\ndisplacement => increments = 8\ntime = 8.0\ndisplacement"
+    );
+    tests::words::edited(&troubled::case("cut"), &edits.lines().collect::<Vec<_>>())
 }
 
 /// The outcome of the study for an error of 1e-5 where more increments than some find no equilibrium, and
@@ -99,19 +89,10 @@ fn refused(least_time: &'static str) -> Option<(Place, Outcome, serde_json::Valu
 #[test]
 fn finer_trials_that_fail_leave_the_best_one_with_its_error() {
     // A quarter, half and all of the increments tell the error of the last.
-    let Some((place, outcome, chosen)) = refused("LEAST_TIME=0.75") else {
-        return;
-    };
-    let said = &outcome.stderr;
-    assert!(
-        outcome.says("warning: the accuracy is not reached: error"),
-        "{said}"
-    );
-    assert!(
-        outcome.says("(accuracy.csv has why): increments × 2; increments × 4;"),
-        "{said}"
-    );
-    assert!(outcome.says("run 4 failed: phase `push`"), "{said}");
+    let (place, outcome, chosen) = or_skip!(refused("LEAST_TIME=0.75"));
+    outcome.shows("warning: the accuracy is not reached: error");
+    outcome.shows("(accuracy.csv has why): increments × 2; increments × 4;");
+    outcome.shows("run 4 failed: phase `push`");
     assert_eq!(chosen["verdict"], "not reached");
     let report = place.read("out/report.html");
     assert!(report.contains("accuracy 0.00001 not reached, error "));
@@ -128,9 +109,7 @@ fn finer_trials_that_fail_leave_the_best_one_with_its_error() {
     let run = history(&place, "out", 8);
 
     // Truth: 128 times as many increments of a law that refuses none.
-    let Some(place) = troubled::place("LEAST_TIME=1e-9") else {
-        return;
-    };
+    let place = or_skip!(troubled::place("LEAST_TIME=1e-9"));
     let finer = softening("").replacen("increments = 8", "increments = 1024", 1);
     place.done_case(finer);
     let fine = history(&place, "out", 1024);
@@ -151,32 +130,22 @@ fn finer_trials_that_fail_leave_the_best_one_with_its_error() {
 
 #[test]
 fn an_accuracy_that_too_few_trials_tell_is_not_known() {
-    let Some((place, outcome, chosen)) = refused("LEAST_TIME=1.5") else {
-        return;
-    };
-    let said = &outcome.stderr;
-    assert!(
-        outcome.says("warning: it is not known whether the accuracy is reached"),
-        "{said}"
-    );
-    assert!(outcome.says("differ by"), "{said}");
+    let (place, outcome, chosen) = or_skip!(refused("LEAST_TIME=1.5"));
+    outcome.shows("warning: it is not known whether the accuracy is reached");
+    outcome.shows("differ by");
     assert_eq!(chosen["verdict"], "not known");
     assert!(chosen["reached"].is_null());
     assert!(chosen["difference"].as_f64().unwrap() > 1e-5);
     assert_eq!(history(&place, "out", 4).len(), 4);
 
-    let Some((place, outcome, chosen)) = refused("LEAST_TIME=3.0") else {
-        return;
-    };
+    let (place, outcome, chosen) = or_skip!(refused("LEAST_TIME=3.0"));
     outcome.shows("a single run came to its end");
     assert_eq!(chosen["verdict"], "not known");
     assert!(chosen["difference"].is_null());
     assert_eq!(history(&place, "out", 2).len(), 2);
 
     // Nothing is known where no trial comes to its end.
-    let Some(place) = troubled::place("LEAST_TIME=5.0") else {
-        return;
-    };
+    let place = or_skip!(troubled::place("LEAST_TIME=5.0"));
     place
         .run_case(softening("accuracy = 1e-5"))
         .ended(NO_EQUILIBRIUM);

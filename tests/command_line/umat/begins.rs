@@ -2,15 +2,14 @@
 
 use super::routines::checked;
 use super::{DONE, PLUGIN_TROUBLE, place};
+use tests::or_skip;
 use tests::words::has;
 
 const CHECK: &str = "routine-does-not-begin-again";
 
 #[test]
 fn routines_that_begin_again_are_named() {
-    let Some(place) = place("begins") else {
-        return;
-    };
+    let place = or_skip!(place("begins"));
     for (what, expected, said) in [
         (1, "failed", "with KINC = 1 in place of 2 STRESS ["),
         (2, "failed", "with TIME(1) = 0 in place of 1 STRESS ["),
@@ -43,9 +42,7 @@ fn routines_that_begin_again_are_named() {
 /// Actions of a routine in the very first increment, and on DDSDDE alone, change no result.
 #[test]
 fn routines_that_begin_once_are_not() {
-    let Some(place) = place("begins") else {
-        return;
-    };
+    let place = or_skip!(place("begins"));
     for what in [0, 5, 6, 7] {
         let set = format!("what={what}");
         let (checks, outcome) = checked(&place, "begins", &["--set", &set]);
@@ -60,9 +57,7 @@ fn routines_that_begin_once_are_not() {
 /// The same call, made again after another step, shows data kept from call to call.
 #[test]
 fn a_step_kept_from_the_last_call_is_named() {
-    let Some(place) = place("begins") else {
-        return;
-    };
+    let place = or_skip!(place("begins"));
     let (checks, outcome) = checked(&place, "begins", &["--set", "what=8"]);
     let [found, details] = &checks[CHECK];
     assert_eq!(found, "failed", "{details}");
@@ -74,9 +69,7 @@ fn a_step_kept_from_the_last_call_is_named() {
 /// A routine that depends on the time may depend on that of the step, which is reported all the same.
 #[test]
 fn the_time_of_a_step_is_asked_for_where_the_time_counts() {
-    let Some(place) = place("begins") else {
-        return;
-    };
+    let place = or_skip!(place("begins"));
     let sidecar = place.read("begins.law.toml");
     place.write(
         "begins.law.toml",

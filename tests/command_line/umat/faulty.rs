@@ -2,12 +2,11 @@
 
 use super::{driver, place, rows, soil};
 use crate::program::PLUGIN_TROUBLE;
+use tests::or_skip;
 
 #[test]
 fn a_routine_that_ends_its_process_ends_an_increment() {
-    let Some(place) = place("stops") else {
-        return;
-    };
+    let place = or_skip!(place("stops"));
     for (how, says) in [
         (1, "ended its process: exit code 3"),
         (
@@ -36,9 +35,7 @@ fn a_routine_that_ends_its_process_ends_an_increment() {
 
 #[test]
 fn a_tangent_that_is_left_unset_is_named() {
-    let Some(place) = place("unset") else {
-        return;
-    };
+    let place = or_skip!(place("unset"));
     // Strains alone need no tangent; a stress does.
     let text = driver("unset", "", "");
     assert_eq!(rows(&place, &text).len(), 11);
@@ -56,9 +53,7 @@ fn a_tangent_that_is_left_unset_is_named() {
 
 #[test]
 fn a_routine_without_an_answer_is_the_librarys_fault() {
-    let Some(place) = place("stops") else {
-        return;
-    };
+    let place = or_skip!(place("stops"));
     for (how, says) in [
         (4, "leaves PNEWDT = -1"),
         (5, "leaves PNEWDT = NaN"),
@@ -85,9 +80,7 @@ fn a_routine_without_an_answer_is_the_librarys_fault() {
 
 #[test]
 fn what_is_overwritten_is_named() {
-    let Some(place) = place("overwrites") else {
-        return;
-    };
+    let place = or_skip!(place("overwrites"));
     for (what, says) in [
         (1, "overwrites CMNAME, which is an input"),
         (2, "overwrites PROPS, which is an input"),
@@ -103,13 +96,9 @@ fn what_is_overwritten_is_named() {
             "driver.toml",
             driver("overwrites", "", &format!("what = {what}")),
         );
-        let outcome = place.run(&["point", "driver.toml", "--csv", "out.csv"]);
-        assert_eq!(
-            outcome.code,
-            Some(PLUGIN_TROUBLE),
-            "{what}: {}",
-            outcome.stderr
-        );
+        let outcome = place
+            .run(&["point", "driver.toml", "--csv", "out.csv"])
+            .ended(PLUGIN_TROUBLE);
         outcome.shows(says);
     }
 }

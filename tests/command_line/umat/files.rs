@@ -2,12 +2,11 @@
 
 use super::{driver, place, soil};
 use crate::program::{BAD_INPUT, DONE, PLUGIN_TROUBLE, refuses_file};
+use tests::or_skip;
 
 #[test]
 fn a_changed_sidecar_is_another_run() {
-    let Some(place) = place("elastic") else {
-        return;
-    };
+    let place = or_skip!(place("elastic"));
     // ν is left to the default of the sidecar.
     let case = soil("elastic", "").replacen(", poisson_ratio = 0.3 }", " }", 1);
     let sidecar = place.read("elastic.law.toml");
@@ -23,8 +22,7 @@ fn a_changed_sidecar_is_another_run() {
     ] {
         assert!(sidecar.contains(from), "{from}");
         place.write("elastic.law.toml", sidecar.replacen(from, to, 1));
-        let outcome = resumed();
-        assert_eq!(outcome.code, Some(BAD_INPUT), "{to}: {}", outcome.stderr);
+        let outcome = resumed().ended(BAD_INPUT);
         outcome
             .shows("checkpoint.bin")
             .shows("other libraries or sidecars");
@@ -35,9 +33,7 @@ fn a_changed_sidecar_is_another_run() {
 
 #[test]
 fn mistakes_in_files_are_named() {
-    let Some(place) = place("elastic") else {
-        return;
-    };
+    let place = or_skip!(place("elastic"));
     let (run, good) = (["point", "driver.toml"], driver("elastic", "", ""));
     let refuses = |file: (&str, &str), code: i32, mistakes: &str| {
         refuses_file(&place, file, &run, code, mistakes);
@@ -103,9 +99,7 @@ version => symbol = "other_"\nversion
 
 #[test]
 fn sidecars_without_sense_are_refused() {
-    let Some(place) = place("elastic") else {
-        return;
-    };
+    let place = or_skip!(place("elastic"));
     let sidecar = place.read("elastic.law.toml");
     place.write("driver.toml", driver("elastic", "", ""));
     let run = ["point", "driver.toml"];

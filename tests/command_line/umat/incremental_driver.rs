@@ -4,7 +4,9 @@ use super::{number, place};
 use crate::program::{BAD_INPUT, NO_EQUILIBRIUM, Place};
 use std::collections::BTreeMap;
 use tests::case::table;
+use tests::or_skip;
 use tests::tolerance::close;
+use tests::words::words;
 
 /// Input of the IncrementalDriver for a material with E = 2e4 and ν = 0.3.
 fn incremental(place: &Place, test: &str) {
@@ -44,9 +46,7 @@ fn changes(rows: &[BTreeMap<String, String>], from: usize, to: usize, what: &str
 
 #[test]
 fn input_of_the_incremental_driver_is_followed() {
-    let Some(place) = place("elastic") else {
-        return;
-    };
+    let place = or_skip!(place("elastic"));
     incremental(
         &place,
         "*OedometricE1\n4 100 1.0\n-1.0d-3\n*OedometricS1\n4 100 1.0\n-20.0\n\
@@ -74,13 +74,7 @@ fn input_of_the_incremental_driver_is_followed() {
     close(16, 20, "strain_33", 12.0 / (3.0 * g));
     close(20, 24, "strain_11", -1e-3);
     close(20, 24, "stress_11", -2.0 * g * 1e-3);
-    for what in [
-        "stress_11",
-        "stress_22",
-        "stress_12",
-        "strain_11",
-        "strain_12",
-    ] {
+    for what in words("stress_11 stress_22 stress_12 strain_11 strain_12") {
         close(24, 30, what, 0.0);
         // A whole period.
         close(30, 38, what, 0.0);
@@ -97,9 +91,7 @@ fn input_of_the_incremental_driver_is_followed() {
 /// After a colon the numbers of a step say which states are written: every N-th of the step, and its end.
 #[test]
 fn every_so_many_states_are_written() {
-    let Some(place) = place("elastic") else {
-        return;
-    };
+    let place = or_skip!(place("elastic"));
     let run = |every: [&str; 3]| {
         let [first, wave, repeated] = every;
         incremental(
@@ -133,9 +125,7 @@ fn every_so_many_states_are_written() {
 
 #[test]
 fn restrictions_between_stress_and_strain_are_obeyed() {
-    let Some(place) = place("elastic") else {
-        return;
-    };
+    let place = or_skip!(place("elastic"));
     // Axial strain at a constant mean stress, 22 and 33 alike; a spring against the shear 23.
     incremental(
         &place,
@@ -170,9 +160,7 @@ fn restrictions_between_stress_and_strain_are_obeyed() {
 
 #[test]
 fn restrictions_are_followed_where_a_law_flows() {
-    let Some(place) = place("drucker_prager") else {
-        return;
-    };
+    let place = or_skip!(place("drucker_prager"));
     let run = |test: &str| {
         incremental(&place, test);
         place.write(
@@ -209,9 +197,7 @@ fn restrictions_are_followed_where_a_law_flows() {
 
 #[test]
 fn restrictions_that_contradict_each_other_are_not_met() {
-    let Some(place) = place("elastic") else {
-        return;
-    };
+    let place = or_skip!(place("elastic"));
     incremental(
         &place,
         "*ObeyRestrictions\n1 100 1.0\nsd1 = -1\n2*sd1 = -4\nsd3 = 0\nsd4 = 0\nsd5 = 0\nsd6 = 0\n",
@@ -225,16 +211,15 @@ fn restrictions_that_contradict_each_other_are_not_met() {
 /// Runs the elastic routine through tests that must be refused: rows of the test, with `\n` for the end of a line, and
 /// what is reported.
 fn refused(tests: &str) {
-    let Some(place) = place("elastic") else {
-        return;
-    };
+    let place = or_skip!(place("elastic"));
     for row in tests.lines().skip(1) {
         let mut parts = row.split(" | ");
         incremental(&place, &parts.next().unwrap().replace("\\n", "\n"));
-        let outcome = place.run(&["point", "test.inp", "--umat", "libelastic.so"]);
-        assert_eq!(outcome.code, Some(BAD_INPUT), "{row}: {}", outcome.stderr);
+        let outcome = place
+            .run(&["point", "test.inp", "--umat", "libelastic.so"])
+            .ended(BAD_INPUT);
         for text in parts {
-            assert!(outcome.says(text), "{row}: {text}\n{}", outcome.stderr);
+            outcome.shows(text);
         }
     }
 }
@@ -281,9 +266,7 @@ fn what_is_not_read_of_the_incremental_driver_is_said() {
 
 #[test]
 fn parameters_are_those_of_the_sidecar() {
-    let Some(place) = place("elastic") else {
-        return;
-    };
+    let place = or_skip!(place("elastic"));
     incremental(&place, "*PureCreep\n1 1 1\n");
     place.write("parameters.inp", "elastic\n3\n1\n1\n1\n");
     let outcome = place.refused(&["point", "test.inp", "--umat", "libelastic.so"]);

@@ -4,6 +4,7 @@ use super::routines::checked;
 use super::{DONE, PLUGIN_TROUBLE, Place, place};
 use crate::program::Outcome;
 use std::collections::BTreeMap;
+use tests::or_skip;
 use tests::words::has;
 use tests::words::words;
 
@@ -18,9 +19,7 @@ fn planted(place: &Place, what: u32, more: &[&str]) -> (Checks, Outcome) {
 
 #[test]
 fn a_correct_one_passes() {
-    let Some(place) = place("planted") else {
-        return;
-    };
+    let place = or_skip!(place("planted"));
     let (checks, outcome) = planted(&place, 0, &[]);
     outcome.ended(DONE);
     for (id, [found, details]) in &checks {
@@ -51,9 +50,7 @@ const PLANTED: &str = "
 
 #[test]
 fn each_mistake_is_called_by_its_name() {
-    let Some(place) = place("planted") else {
-        return;
-    };
+    let place = or_skip!(place("planted"));
     for row in PLANTED.lines().skip(1) {
         let row: Vec<&str> = row.splitn(4, ' ').collect();
         let [what, id, expected, said] = row[..] else {
@@ -73,9 +70,7 @@ fn each_mistake_is_called_by_its_name() {
 /// A run, too, reports writing beyond an array.
 #[test]
 fn a_run_tells_what_is_written_beyond_an_array() {
-    let Some(place) = place("planted") else {
-        return;
-    };
+    let place = or_skip!(place("planted"));
     let driver = "law = \"umat_planted\"\nadapter = \"umat\"\nlibrary = \"libplanted.so\"\n\
                   hypothesis = \"plane_strain\"\nparameters = { what = 6 }\n\
                   [[segment]]\nincrements = 10\ncontrol = { 12 = { strain = 1e-2 } }\n";
@@ -88,9 +83,7 @@ fn a_run_tells_what_is_written_beyond_an_array() {
 /// A STOP far away fails one check, which is shown among those that fail; the others go on nearby.
 #[test]
 fn a_stop_far_away_is_a_failure_of_one_check() {
-    let Some(place) = place("planted") else {
-        return;
-    };
+    let place = or_skip!(place("planted"));
     let (checks, outcome) = planted(&place, 8, &["--only-failed"]);
     outcome.ended(PLUGIN_TROUBLE);
     // The others warn of it.
@@ -114,9 +107,7 @@ fn a_stop_far_away_is_a_failure_of_one_check() {
 /// Parameters that make everything elastic are reported, since all else passes.
 #[test]
 fn paths_that_never_yield_are_told_of() {
-    let Some(place) = place("planted") else {
-        return;
-    };
+    let place = or_skip!(place("planted"));
     let (checks, outcome) = planted(&place, 3, &["--set", "yield_stress=1e9"]);
     outcome.ended(DONE);
     let [found, details] = &checks["paths-leave-elasticity"];
@@ -127,9 +118,7 @@ fn paths_that_never_yield_are_told_of() {
 /// Values that nothing speaks for are named, and are not where they are given.
 #[test]
 fn parameters_without_a_ground_are_named() {
-    let Some(place) = place("planted") else {
-        return;
-    };
+    let place = or_skip!(place("planted"));
     let path = place.path("planted.law.toml");
     std::fs::remove_file(&path).unwrap();
     place.done(&words("new-sidecar libplanted.so --nprops 5 --nstatv 1"));
@@ -140,13 +129,7 @@ fn parameters_without_a_ground_are_named() {
     // What the guide leaves out of a sidecar is not asked for.
     let [found, details] = &checks["description-is-complete"];
     assert_eq!(found, "passed", "{details}");
-    let all = [
-        "prop_1=5e5",
-        "prop_2=0.3",
-        "prop_3=200",
-        "prop_4=600",
-        "prop_5=0",
-    ];
+    let all = words("prop_1=5e5 prop_2=0.3 prop_3=200 prop_4=600 prop_5=0");
     let all: Vec<&str> = all.iter().flat_map(|set| ["--set", set]).collect();
     let (checks, _) = checked(&place, "planted", &all);
     let [found, details] = &checks["sidecar-is-read"];
@@ -156,9 +139,7 @@ fn parameters_without_a_ground_are_named() {
 /// A sidecar with too few parameters leaves a routine without the last one, which is read all the same.
 #[test]
 fn a_parameter_that_the_sidecar_lacks_is_told() {
-    let Some(place) = place("planted") else {
-        return;
-    };
+    let place = or_skip!(place("planted"));
     let path = place.path("planted.law.toml");
     std::fs::remove_file(&path).unwrap();
     let arguments = words("new-sidecar libplanted.so --nprops 3 --nstatv 1");
@@ -176,9 +157,7 @@ fn a_parameter_that_the_sidecar_lacks_is_told() {
 /// A replay has the numbers of the check: it makes the same calls.
 #[test]
 fn a_replay_has_the_numbers_of_the_check() {
-    let Some(place) = place("planted") else {
-        return;
-    };
+    let place = or_skip!(place("planted"));
     for (what, id) in [
         (1, "routine-stays-at-rest"),
         (4, "response-is-isotropic"),

@@ -3,13 +3,12 @@
 use super::{driver, number, place, recorded, rows, soil};
 use crate::program::{CASE, PLUGIN_TROUBLE};
 use tests::case::table;
+use tests::or_skip;
 use tests::words::rows_of;
 
 #[test]
 fn a_call_can_be_recorded() {
-    let Some(place) = place("elastic") else {
-        return;
-    };
+    let place = or_skip!(place("elastic"));
     let rows = rows(&place, &driver("elastic", "record = \"call.toml\"", ""));
     let text = place.read("call.toml");
     let call: toml::Table = toml::from_str(&text).unwrap();
@@ -36,9 +35,7 @@ fn a_call_can_be_recorded() {
 
 #[test]
 fn the_option_records_a_call() {
-    let Some(place) = place("elastic") else {
-        return;
-    };
+    let place = or_skip!(place("elastic"));
     place.write("driver.toml", driver("elastic", "", ""));
     // What stood there is not mistaken for a record.
     place.write("call.toml", "an earlier one");
@@ -88,9 +85,7 @@ point | own.toml | law `elastic` is no UMAT
 
 #[test]
 fn a_call_that_never_returns_is_recorded_too() {
-    let Some(place) = place("stops") else {
-        return;
-    };
+    let place = or_skip!(place("stops"));
     place.write(
         "driver.toml",
         driver("stops", "", "how = 1\nlimit = 1.1e-3"),

@@ -6,6 +6,7 @@ use super::{BAD_INPUT, DONE, PLUGIN_TROUBLE, Place, number, place, rows};
 use crate::program::Outcome;
 use serde_json::Value;
 use std::collections::BTreeMap;
+use tests::or_skip;
 use tests::words::has;
 use tests::words::{rows_of, words};
 
@@ -65,9 +66,7 @@ fn who_supplies_what_a_routine_calls_is_said() {
 
 #[test]
 fn a_new_sidecar_can_be_used_at_once() {
-    let Some(place) = bare("elastic") else {
-        return;
-    };
+    let place = or_skip!(bare("elastic"));
     let outcome = place.run(&["inspect", "libelastic.so"]);
     outcome.prints("without a sidecar: `pilum new-sidecar`");
     let driver = "law = \"elastic\"\nadapter = \"umat\"\nlibrary = \"libelastic.so\"\n\
@@ -101,9 +100,7 @@ fn a_new_sidecar_can_be_used_at_once() {
 
 #[test]
 fn a_new_sidecar_names_as_much_as_it_is_told() {
-    let Some(place) = bare("joint_3d") else {
-        return;
-    };
+    let place = or_skip!(bare("joint_3d"));
     let arguments = "new-sidecar libjoint_3d.so --nprops 3 --nstatv 4 --ntens 2,3 --out other.toml";
     place.done(&arguments.split(' ').collect::<Vec<_>>());
     let driver = "law = \"joint_3d\"\nadapter = \"umat\"\nlibrary = \"libjoint_3d.so\"\n\
@@ -121,9 +118,7 @@ fn a_new_sidecar_names_as_much_as_it_is_told() {
 
 #[test]
 fn what_a_sidecar_cannot_be_for_is_refused() {
-    let Some(place) = bare("elastic") else {
-        return;
-    };
+    let place = or_skip!(bare("elastic"));
     place.write("libnothing.so", "no library");
     let deps = std::env::current_exe()
         .unwrap()
@@ -150,16 +145,14 @@ libnothing.so --nprops 2 | 3 | libnothing.so is no library
             "{arguments}: {}",
             outcome.stderr
         );
-        assert!(outcome.says(said), "{arguments}: {}", outcome.stderr);
+        outcome.shows(said);
     }
     assert_eq!(place.contents(), ["libelastic.so", "libnothing.so"]);
 }
 
 #[test]
 fn laws_shows_a_routine_with_a_sidecar() {
-    let Some(place) = place("maxwell") else {
-        return;
-    };
+    let place = or_skip!(place("maxwell"));
     let outcome = place.done(&["laws", "libmaxwell.so"]);
     outcome
         .prints("umat_maxwell: Maxwell body")
@@ -171,22 +164,14 @@ fn laws_shows_a_routine_with_a_sidecar() {
     let folder = place.path("");
     let folder = folder.to_str().unwrap();
     let by_id = place.run(&["laws", "umat_maxwell", "--law-path", folder]);
-    assert!(
-        by_id.stdout.contains("umat_maxwell: Maxwell body"),
-        "{}",
-        by_id.stderr
-    );
+    has(&by_id.stdout, "umat_maxwell: Maxwell body");
     let list = place.run(&["laws", "--law-path", folder]);
     let line = list
         .stdout
         .lines()
         .find(|line| line.starts_with("umat_maxwell "));
     let line = line.unwrap_or_default();
-    assert!(
-        line.contains("plane_strain, axisymmetric, 3d, UMAT"),
-        "{}",
-        list.stdout
-    );
+    has(line, "plane_strain, axisymmetric, 3d, UMAT");
     let page = json(&place.run(&["laws", "libmaxwell.so", "--json"]));
     assert_eq!(page["id"], "umat_maxwell");
     assert_eq!(page["formulations"][0]["time_dependent"], true);
@@ -237,9 +222,7 @@ doubtful | -
     ) {
         let more = words(settings).into_iter().filter(|set| *set != "-");
         let more: Vec<&str> = more.flat_map(|set| ["--set", set]).collect();
-        let Some(place) = place(name) else {
-            return;
-        };
+        let place = or_skip!(place(name));
         let (checks, outcome) = checked(&place, name, &more);
         assert_eq!(outcome.code, Some(DONE), "{name}: {}", outcome.stderr);
         assert!(checks.len() >= 12, "{name}: {checks:?}");
@@ -262,9 +245,7 @@ doubtful | -
 /// Where a routine ends its process far away, one check fails; the others go on nearby, and say so.
 #[test]
 fn a_routine_that_gives_up_far_away_is_checked_nearby() {
-    let Some(place) = place("stops") else {
-        return;
-    };
+    let place = or_skip!(place("stops"));
     let more = ["young_modulus=1e7", "how=2", "limit=0.05"].map(|set| format!("--set={set}"));
     let more: Vec<&str> = more.iter().map(String::as_str).collect();
     let (checks, outcome) = checked(&place, "stops", &more);
@@ -290,9 +271,7 @@ fn a_routine_that_gives_up_far_away_is_checked_nearby() {
 /// The way a routine ends its process is reported once, with the checks that it ended.
 #[test]
 fn what_ends_many_checks_is_told_once() {
-    let Some(place) = place("stops") else {
-        return;
-    };
+    let place = or_skip!(place("stops"));
     let more = ["young_modulus=1e7", "how=1", "limit=0.05"].map(|set| format!("--set={set}"));
     let more: Vec<&str> = more.iter().map(String::as_str).collect();
     let (checks, outcome) = checked(&place, "stops", &more);
@@ -316,9 +295,7 @@ fn what_ends_many_checks_is_told_once() {
 /// A defect of a sidecar fails its check, and no other.
 #[test]
 fn a_wrong_sidecar_is_told_once() {
-    let Some(place) = place("elastic") else {
-        return;
-    };
+    let place = or_skip!(place("elastic"));
     let sidecar = place.read("elastic.law.toml");
     place.write(
         "elastic.law.toml",
@@ -338,27 +315,16 @@ fn a_wrong_sidecar_is_told_once() {
 
 #[test]
 fn checks_and_settings_that_do_not_fit_are_refused() {
-    let Some(place) = place("elastic") else {
-        return;
-    };
-    let cases = [
-        (
-            vec!["--set", "youngs_modulus=1e4"],
-            "the sidecar names no parameter `youngs_modulus`: did you mean `young_modulus`?",
-        ),
-        (
-            vec!["--set", "poisson_ratio=0.5"],
-            "0.5 is outside (-1, 0.5)",
-        ),
-        (
-            vec!["--only", "handshake-is-accepted"],
-            "this check is for libraries of the contract",
-        ),
-    ];
-    for (more, said) in cases {
-        let (_, outcome) = checked(&place, "elastic", &more);
-        let outcome = outcome.ended(BAD_INPUT);
-        outcome.shows(said);
+    let place = or_skip!(place("elastic"));
+    for [more, said] in rows_of(
+        "
+--set youngs_modulus=1e4 | the sidecar names no parameter `youngs_modulus`: did you mean `young_modulus`?
+--set poisson_ratio=0.5 | 0.5 is outside (-1, 0.5)
+--only handshake-is-accepted | this check is for libraries of the contract
+",
+    ) {
+        let (_, outcome) = checked(&place, "elastic", &words(more));
+        outcome.ended(BAD_INPUT).shows(said);
     }
     let deps = std::env::current_exe()
         .unwrap()

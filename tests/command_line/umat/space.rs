@@ -2,6 +2,7 @@
 
 use super::{DONE, Place, number, place, rows};
 use std::collections::BTreeMap;
+use tests::or_skip;
 use tests::tolerance::close;
 use tests::tolerance::near;
 
@@ -38,9 +39,7 @@ fn sheared(
 
 #[test]
 fn three_components_come_normal_first() {
-    let Some(place) = place("joint_3d") else {
-        return;
-    };
+    let place = or_skip!(place("joint_3d"));
     let all = sheared(&place, "interface_3d", &[("t", 0.6), ("s", 0.8)]);
     let end = &all[10];
     for (column, expected) in [
@@ -71,9 +70,7 @@ fn three_components_come_normal_first() {
 
 #[test]
 fn space_gives_what_the_plane_gives() {
-    let Some(place) = place("joint_3d") else {
-        return;
-    };
+    let place = or_skip!(place("joint_3d"));
     let plane = sheared(&place, "interface_2d", &[("t", 1.0)]);
     let along = sheared(&place, "interface_3d", &[("t", 1.0), ("s", 0.0)]);
     let askew = sheared(&place, "interface_3d", &[("t", -0.28), ("s", 0.96)]);
@@ -96,9 +93,7 @@ fn space_gives_what_the_plane_gives() {
 
 #[test]
 fn figures_draw_both_slips_and_the_friction_of_both() {
-    let Some(place) = place("joint_3d") else {
-        return;
-    };
+    let place = or_skip!(place("joint_3d"));
     let text = driver(
         "interface_3d",
         "[[segment]]\nincrements = 10\ncontrol = { t = { jump = 3e-3 }, s = { jump = 4e-3 } }\n\

@@ -7,6 +7,7 @@ use super::{Place, number, place, rows, soil};
 use crate::program::edited;
 use std::time::{Duration, Instant};
 use tests::case::table;
+use tests::or_skip;
 use tests::tolerance::close;
 use tests::tolerance::near;
 use tests::words::rows_of;
@@ -34,9 +35,7 @@ fn relaxed(place: &Place, increments: usize) -> f64 {
 
 #[test]
 fn a_strain_that_is_held_relaxes_as_backward_euler_has_it() {
-    let Some(place) = place("maxwell") else {
-        return;
-    };
+    let place = or_skip!(place("maxwell"));
     let start = -20.0 / (1.0 + 1e-6 / TAU);
     let exact = start * f64::exp(-3.0);
     let mut errors = Vec::new();
@@ -54,9 +53,7 @@ fn a_strain_that_is_held_relaxes_as_backward_euler_has_it() {
 
 #[test]
 fn a_stress_that_is_held_creeps_in_proportion_to_the_time() {
-    let Some(place) = place("maxwell") else {
-        return;
-    };
+    let place = or_skip!(place("maxwell"));
     // ε̇ = σ/(E τ): backward Euler is exact, whatever the increments.
     for n in [1, 7] {
         let text = driver(&format!("increments = {n}\ntime = 2500.0\ncontrol = {{}}"));
@@ -71,9 +68,7 @@ fn a_stress_that_is_held_creeps_in_proportion_to_the_time() {
 
 #[test]
 fn time_and_dtime_are_those_of_the_segment() {
-    let Some(place) = place("maxwell") else {
-        return;
-    };
+    let place = or_skip!(place("maxwell"));
     let text = driver("increments = 5\ntime = 3000.0\ncontrol = { 22 = { strain = -1e-3 } }")
         + "[[segment]]\nincrements = 2\ncontrol = { 22 = { strain = 0.0 } }\n";
     let rows = rows(&place, &text);
@@ -109,9 +104,7 @@ fn time_and_dtime_are_those_of_the_segment() {
 
 #[test]
 fn steps_of_an_increment_share_its_time() {
-    let Some(place) = place("maxwell") else {
-        return;
-    };
+    let place = or_skip!(place("maxwell"));
     let text = driver("increments = 3\ntime = 3000.0\ncontrol = { 22 = { strain = -1e-3 } }")
         .replacen("longest = 1e30", "longest = 260.0", 1);
     let rows = rows(&place, &text);
@@ -174,9 +167,7 @@ fn in_theory(n: i32, length: f64) -> f64 {
 
 #[test]
 fn a_phase_gives_its_time_to_its_increments() {
-    let Some(place) = place("maxwell") else {
-        return;
-    };
+    let place = or_skip!(place("maxwell"));
     let outcome = place.done_case(held("", "increments = 6\ntime = 3000.0"));
     outcome.hides("depends on the time");
     let rows = table(&place.path("out/history.csv"));
@@ -204,9 +195,7 @@ fn a_phase_gives_its_time_to_its_increments() {
 
 #[test]
 fn a_phase_that_is_cut_shares_its_time() {
-    let Some(place) = place("maxwell") else {
-        return;
-    };
+    let place = or_skip!(place("maxwell"));
     place.done_case(held(", longest = 130.0", "increments = 6\ntime = 3000.0"));
     let rows = table(&place.path("out/history.csv"));
     let end = rows.last().unwrap();
@@ -226,9 +215,7 @@ fn a_phase_that_is_cut_shares_its_time() {
 
 #[test]
 fn a_run_that_is_killed_goes_on_in_time() {
-    let Some(place) = place("maxwell") else {
-        return;
-    };
+    let place = or_skip!(place("maxwell"));
     let text = held("", "increments = 400\ntime = 3000.0");
     place.write("block.toml", &text);
     let arguments = ["run", "block.toml", "--out", "out", "--checkpoint", "0"];
@@ -261,27 +248,21 @@ fn a_run_that_is_killed_goes_on_in_time() {
 
 #[test]
 fn a_phase_without_a_time_is_told_of() {
-    let Some(place) = place("maxwell") else {
-        return;
-    };
+    let place = or_skip!(place("maxwell"));
     let outcome = place.done_case(held("", "increments = 2"));
     let said = "phase `hold` has no `time`, and law `soil` depends on time: the phase takes 1 unit of time";
     outcome.shows(said).hides("phase `push` has no `time`");
     let rows = table(&place.path("out/history.csv"));
     assert_eq!(number(rows.last().unwrap(), "time"), 3.0);
     // A routine that says nothing of the time is not asked about it.
-    let Some(elastic) = super::place("elastic") else {
-        return;
-    };
+    let elastic = or_skip!(super::place("elastic"));
     let outcome = elastic.done_case(soil("elastic", ""));
     outcome.hides("depends on the time");
 }
 
 #[test]
 fn times_that_cannot_be_are_refused_at_their_place() {
-    let Some(place) = place("maxwell") else {
-        return;
-    };
+    let place = or_skip!(place("maxwell"));
     for [time, said] in rows_of(
         r#"
 0.0 | `time` is 0, expected above 0
@@ -296,18 +277,10 @@ nan | `time`: nan is no finite number
             driver(&format!("increments = 2\ntime = {time}\ncontrol = {{}}")),
         );
         let outcome = place.refused(&["point", "driver.toml", "--csv", "out.csv"]);
-        assert!(outcome.says(said), "{time}: {}", outcome.stderr);
-        assert!(
-            outcome.says("driver.toml:12:8"),
-            "{time}: {}",
-            outcome.stderr
-        );
+        outcome.shows(said);
+        outcome.shows("driver.toml:12:8");
         let outcome = place.refused_case(held("", &format!("increments = 2\ntime = {time}")));
-        assert!(outcome.says(said), "{time}: {}", outcome.stderr);
-        assert!(
-            outcome.says(&format!("time = {time}")),
-            "{time}: {}",
-            outcome.stderr
-        );
+        outcome.shows(said);
+        outcome.shows(format!("time = {time}"));
     }
 }

@@ -88,42 +88,11 @@ pub(super) const GALLERY: [(&str, &str); 83] = [
 ];
 
 /// Those in which the check's process crashes.
-pub(super) const CRASHED: [&str; 14] = [
-    "bad_entry_abort",
-    "bad_create_abort",
-    "bad_destroy_null",
-    "bad_abort",
-    "bad_exit",
-    "bad_loop",
-    "bad_short_batch",
-    "bad_null_status",
-    "bad_message",
-    "bad_overrun",
-    "bad_overread",
-    "bad_input",
-    "bad_huge_step",
-    "bad_long_array",
-];
+pub(super) const CRASHED: &str = "bad_entry_abort bad_create_abort bad_destroy_null bad_abort bad_exit bad_loop bad_short_batch bad_null_status bad_message bad_overrun bad_overread bad_input bad_huge_step bad_long_array";
 
 /// Faults that a host can see before it is too late: `pilum point` refuses the library or stops
 /// the run. Against the others only another process helps.
-pub(super) const REFUSED: [&str; 15] = [
-    "bad_magic",
-    "bad_major",
-    "bad_layout_hash",
-    "bad_truncated_plugin",
-    "bad_tangent_flags",
-    "bad_truncated_law",
-    "bad_truncated_parameter",
-    "bad_future_parameter",
-    "bad_future_variable",
-    "bad_count_of_laws",
-    "bad_count_of_parameters",
-    "bad_count_of_states",
-    "bad_ids",
-    "bad_undefined_symbol",
-    "bad_nan",
-];
+pub(super) const REFUSED: &str = "bad_magic bad_major bad_layout_hash bad_truncated_plugin bad_tangent_flags bad_truncated_law bad_truncated_parameter bad_future_parameter bad_future_variable bad_count_of_laws bad_count_of_parameters bad_count_of_states bad_ids bad_undefined_symbol bad_nan";
 
 /// Mistakes that may be meant: the fixture, and the one check that warns.
 pub(super) const WARNED: [(&str, &str); 20] = [

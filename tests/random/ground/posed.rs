@@ -84,26 +84,20 @@ impl Ground {
             }
         }
         let is = |a: f64, b: f64| (a - b).abs() < 1e-9;
+        let inside = |x: f64| x < BLOCK + 1e-9;
+        let outside = |x: f64| x > BLOCK - 1e-9;
+        let above = |y: f64| y > LAYER - 1e-9;
         let lines: [(&str, IsOn); 7] = [
             ("near", Box::new(move |[x, _]| is(x, 0.0))),
             ("far", Box::new(move |[x, _]| is(x, WIDTH))),
             ("bottom", Box::new(move |[_, y]| is(y, 0.0))),
             (
                 "surface",
-                Box::new(move |[x, y]| is(y, HEIGHT) && x > BLOCK - 1e-9),
+                Box::new(move |[x, y]| is(y, HEIGHT) && outside(x)),
             ),
-            (
-                "head",
-                Box::new(move |[x, y]| is(y, HEIGHT) && x < BLOCK + 1e-9),
-            ),
-            (
-                "shaft",
-                Box::new(move |[x, y]| is(x, BLOCK) && y > LAYER - 1e-9),
-            ),
-            (
-                "base",
-                Box::new(move |[x, y]| is(y, LAYER) && x < BLOCK + 1e-9),
-            ),
+            ("head", Box::new(move |[x, y]| is(y, HEIGHT) && inside(x))),
+            ("shaft", Box::new(move |[x, y]| is(x, BLOCK) && above(y))),
+            ("base", Box::new(move |[x, y]| is(y, LAYER) && inside(x))),
         ];
         for (name, is_on) in lines {
             mesh.name_line(name, |edge| edge.iter().all(|&[x, y]| is_on([x.abs(), y])));

@@ -488,33 +488,18 @@ mod tests {
 
     #[test]
     fn what_is_written_beside_an_array_is_told_with_its_place() {
-        for (argument, word, expected) in [
-            (
-                0,
-                2,
-                "beyond the end of A, which has 2 entries: entry 3 becomes 2.5e0",
-            ),
-            (0, -1, "in front of A: entry 0 becomes 2.5e0"),
-            (
-                0,
-                41,
-                "beyond the end of A, which has 2 entries: entry 42 becomes 2.5e0 (or in front of B: \
-                 entry -216)",
-            ),
-            (
-                1,
-                -16,
-                "in front of B: entry -15 becomes 2.5e0 (or beyond the end of A, which has 2 entries: entry \
-                 243)",
-            ),
-            (2, 1, "beyond the end of N, which has 1 entries"),
-            (
-                3,
-                3,
-                "beyond the end of C, which has 3 entries: entry 4 becomes 2.5e0",
-            ),
-        ] {
-            let why = said(argument, word).unwrap_err();
+        let rows = "
+0 2 beyond the end of A, which has 2 entries: entry 3 becomes 2.5e0
+0 -1 in front of A: entry 0 becomes 2.5e0
+0 41 beyond the end of A, which has 2 entries: entry 42 becomes 2.5e0 (or in front of B: entry -216)
+1 -16 in front of B: entry -15 becomes 2.5e0 (or beyond the end of A, which has 2 entries: entry 243)
+2 1 beyond the end of N, which has 1 entries
+3 3 beyond the end of C, which has 3 entries: entry 4 becomes 2.5e0";
+        for row in rows.trim().lines() {
+            let [argument, word, expected] = row.splitn(3, ' ').collect::<Vec<_>>()[..] else {
+                unreachable!()
+            };
+            let why = said(argument.parse().unwrap(), word.parse().unwrap()).unwrap_err();
             assert_eq!(why, format!("the routine writes {expected}"));
         }
     }

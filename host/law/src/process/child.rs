@@ -362,20 +362,6 @@ mod tests {
         eprintln!("to the error stream");
     }
 
-    #[test]
-    #[cfg(unix)]
-    fn an_abort_is_a_signal() {
-        let ending = run_test("aborts", 60, None).ending;
-        assert_eq!(ending, Ending::Signal(6));
-        assert_eq!(ending.to_string(), "signal 6 (aborted)");
-    }
-
-    #[test]
-    #[ignore = "work for a child"]
-    fn aborts() {
-        std::process::abort();
-    }
-
     /// Processes started by the child hold its output open; they must not keep the parent waiting.
     #[test]
     #[cfg(unix)]

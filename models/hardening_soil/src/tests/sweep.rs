@@ -7,23 +7,7 @@ use crate::spectral::Principal;
 use crate::step::{Increment, Point};
 use crate::{HardeningSoil, HardeningSoilSmall};
 use abi::{ContinuumLaw, Tangent};
-
-/// Uniform numbers in [0, 1): a 64-bit linear congruential generator (Knuth's constants).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.next()
-    }
-}
+use walk::Random;
 
 /// Six increments on two ways, from stresses with random overconsolidation. Every end is within the strength, and
 /// no tangent is stiffer than elasticity times `stiffest`. Returns how often a law asked for a smaller increment.

@@ -80,73 +80,41 @@ fn converges<L: InterfaceLaw<State = State>>(
     }
 }
 
+fn hardens(p: Common, stiffness: f64, slip: f64, tolerance: f64) {
+    let truth = Truth::hardening(p, 100.0);
+    converges(&mepi(p), truth, stiffness, slip, tolerance);
+}
+
+fn softens(p: mepi_softening::Parameters, stiffness: f64, slip: f64, tolerance: f64) {
+    let truth = Truth::softening(p, 100.0);
+    converges(&softening(p), truth, stiffness, slip, tolerance);
+}
+
 #[test]
 fn follows_the_integral_of_the_dilatancy_under_constant_normal_stress() {
-    converges(
-        &mepi(TABLE_4),
-        Truth::hardening(TABLE_4, 100.0),
-        0.0,
-        2e-3,
-        1e-3,
-    );
-    converges(
-        &mepi(TABLE_2),
-        Truth::hardening(TABLE_2, 100.0),
-        0.0,
-        2e-4,
-        1e-3,
-    );
+    hardens(TABLE_4, 0.0, 2e-3, 1e-3);
+    hardens(TABLE_2, 0.0, 2e-4, 1e-3);
     for p in [FONTAINEBLEAU, SILICA] {
-        converges(&softening(p), Truth::softening(p, 100.0), 0.0, 5e-3, 1e-3);
+        softens(p, 0.0, 5e-3, 1e-3);
     }
 }
 
 #[test]
 fn follows_the_integral_of_the_dilatancy_at_constant_volume() {
     let locked = f64::INFINITY;
-    converges(
-        &mepi(TABLE_4),
-        Truth::hardening(TABLE_4, 100.0),
-        locked,
-        1e-3,
-        2e-2,
-    );
-    converges(
-        &mepi(TABLE_2),
-        Truth::hardening(TABLE_2, 100.0),
-        locked,
-        5e-4,
-        2e-2,
-    );
+    hardens(TABLE_4, locked, 1e-3, 2e-2);
+    hardens(TABLE_2, locked, 5e-4, 2e-2);
     for p in [FONTAINEBLEAU, SILICA] {
-        converges(
-            &softening(p),
-            Truth::softening(p, 100.0),
-            locked,
-            4e-4,
-            2e-2,
-        );
+        softens(p, locked, 4e-4, 2e-2);
     }
 }
 
 #[test]
 fn follows_the_integral_of_the_dilatancy_against_a_normal_spring() {
     for stiffness in [1e4, 1e6] {
-        converges(
-            &mepi(TABLE_4),
-            Truth::hardening(TABLE_4, 100.0),
-            stiffness,
-            2e-3,
-            2e-2,
-        );
+        hardens(TABLE_4, stiffness, 2e-3, 2e-2);
         for p in [FONTAINEBLEAU, SILICA] {
-            converges(
-                &softening(p),
-                Truth::softening(p, 100.0),
-                stiffness,
-                3e-3,
-                2e-2,
-            );
+            softens(p, stiffness, 3e-3, 2e-2);
         }
     }
 }

@@ -1,6 +1,9 @@
 //! The schemes against each other: order, tolerance, and what they leave alone.
 
-use super::{IMPLICIT, Random, distance, excess, from_trial, law, rested, size};
+use super::{
+    IMPLICIT, Random, any_angles, distance, excess, from_trial, law, parameters, principal, rested,
+    size,
+};
 use crate::spectral::Spatial;
 use crate::{MohrCoulomb, Parameters, State};
 use abi::substepping::SchemeParameters;
@@ -181,9 +184,9 @@ fn stands_random_states() {
             } else {
                 in_steps(10.0)
             },
-            ..random.parameters(&angles, scale)
+            ..parameters(&mut random, &angles, scale)
         };
-        let stress = super::turned::<6>(random.principal(scale), random.angles());
+        let stress = super::turned::<6>(principal(&mut random, scale), any_angles(&mut random));
         let increment: [f64; 6] =
             std::array::from_fn(|_| random.between(-3.0, 3.0) * scale / p.young_modulus);
         let start = rested(stress, increment);

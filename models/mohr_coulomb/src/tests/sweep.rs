@@ -1,7 +1,10 @@
 //! Random states over all angles and scales: the end is admissible, stays where it is, and does
 //! not depend on the axes or on how many components the point has.
 
-use super::{Random, distance, excess, from_trial, law, rested, size, turned};
+use super::{
+    Random, any_angles, distance, excess, from_trial, law, parameters, principal, rested, size,
+    turned,
+};
 use crate::Parameters;
 use abi::{ContinuumLaw as _, Tangent};
 
@@ -13,15 +16,15 @@ const ROUND_OFF: f64 = 1e-12;
 /// Parameters of any scale and an elastic predictor up to 10⁶ times the strength.
 fn extreme(random: &mut Random) -> (Parameters, [f64; 3]) {
     let scale = 10_f64.powf(random.between(-6.0, 6.0));
-    let p = random.parameters(&ANGLES, scale);
+    let p = parameters(random, &ANGLES, scale);
     let size = random.one_of(&[0.1, 1.0, 10.0, 1e3, 1e6]);
-    (p, random.principal(size * scale))
+    (p, principal(random, size * scale))
 }
 
 fn is_admissible_and_stays<const N: usize>(random: &mut Random) {
     let (p, values) = extreme(random);
     let law = law(p);
-    let trial: [f64; N] = turned(values, random.angles());
+    let trial: [f64; N] = turned(values, any_angles(random));
     let end = from_trial(&law, trial);
     assert!(
         excess(&p, &end.stress) < ROUND_OFF,
@@ -93,7 +96,7 @@ fn does_not_depend_on_the_axes() {
     let mut random = Random(7);
     for _ in 0..20_000 {
         let (p, values) = extreme(&mut random);
-        let (law, angles) = (law(p), random.angles());
+        let (law, angles) = (law(p), any_angles(&mut random));
         let straight = from_trial::<6>(&law, turned(values, [0.0; 3]));
         let [a, b, c, ..] = straight.stress;
         let expected: [f64; 6] = turned([a, b, c], angles);
@@ -153,7 +156,7 @@ fn tresca_stands_any_predictor() {
     let law = law(p);
     for _ in 0..10_000 {
         let reach = 10_f64.powf(random.between(0.0, 20.0));
-        let trial: [f64; 4] = turned([reach, -reach, 0.0], random.angles());
+        let trial: [f64; 4] = turned([reach, -reach, 0.0], any_angles(&mut random));
         let nudged = trial.map(|s| s * (1.0 + random.between(-4.0, 4.0) * f64::EPSILON));
         let end = from_trial(&law, nudged);
         assert!(excess(&p, &end.stress) < ROUND_OFF, "{trial:?} {end:?}");

@@ -1,6 +1,9 @@
 //! The consistent tangent against central differences of the update.
 
-use super::{Random, Zone, from_trial, handy, law, principal_values, rested, turned};
+use super::{
+    Random, Zone, any_angles, from_trial, handy, law, parameters, principal, principal_values,
+    rested, turned,
+};
 use crate::{MohrCoulomb, Parameters};
 use abi::{ContinuumLaw as _, Tangent};
 use std::collections::HashMap;
@@ -86,8 +89,8 @@ fn agrees_with_differences_over_random_states() {
     let mut random = Random(3);
     let mut compared = HashMap::new();
     for _ in 0..20_000 {
-        let p = random.parameters(&[0.0, 1.0, 20.0, 45.0, 70.0, 89.9], 1.0);
-        let s = random.principal(1.0);
+        let p = parameters(&mut random, &[0.0, 1.0, 20.0, 45.0, 70.0, 89.9], 1.0);
+        let s = principal(&mut random, 1.0);
         let close = |i: usize, j: usize| {
             let gap = (s[i] - s[j]).abs();
             gap > 0.0 && gap < 0.02
@@ -95,7 +98,7 @@ fn agrees_with_differences_over_random_states() {
         if close(0, 1) || close(0, 2) || close(1, 2) {
             continue;
         }
-        let angles = random.angles();
+        let angles = any_angles(&mut random);
         let plane: [f64; 4] = turned(s, angles);
         let errors = [
             error(&p, plane, 1e-5),
@@ -116,9 +119,13 @@ fn agrees_with_differences_over_random_states() {
 fn is_symmetric_for_associated_flow() {
     let mut random = Random(4);
     for _ in 0..2_000 {
-        let mut p = random.parameters(&[0.0, 10.0, 35.0, 60.0], 1.0);
+        let mut p = parameters(&mut random, &[0.0, 10.0, 35.0, 60.0], 1.0);
         p.dilatancy_angle = p.friction_angle;
-        let t = from_trial::<6>(&law(p), turned(random.principal(1.0), random.angles())).tangent;
+        let t = from_trial::<6>(
+            &law(p),
+            turned(principal(&mut random, 1.0), any_angles(&mut random)),
+        )
+        .tangent;
         let modulus = law(p).elasticity.operator::<6>()[0][0];
         for i in 0..6 {
             for j in 0..i {

@@ -26,6 +26,10 @@ fn check(zone: Zone, tensile_strength: Option<f64>, trial: [f64; 3], expected: [
     }
 }
 
+fn cut(zone: Zone, trial: [f64; 3], expected: [f64; 3]) {
+    check(zone, Some(5.0), trial, expected);
+}
+
 fn compare<const N: usize>(
     law: &crate::MohrCoulomb,
     p: &crate::Parameters,
@@ -100,83 +104,43 @@ fn returns_to_the_apex() {
 /// ν/(1 − ν) = 1/3 of the 3 kPa that s₁ loses.
 #[test]
 fn returns_to_the_tension_plane() {
-    check(
-        Zone::TensionPlane,
-        Some(5.0),
-        [8.0, 0.0, -1.0],
-        [5.0, -1.0, -2.0],
-    );
-    check(
-        Zone::TensionPlane,
-        Some(5.0),
-        [8.0, 0.0, 0.0],
-        [5.0, -1.0, -1.0],
-    );
+    cut(Zone::TensionPlane, [8.0, 0.0, -1.0], [5.0, -1.0, -2.0]);
+    cut(Zone::TensionPlane, [8.0, 0.0, 0.0], [5.0, -1.0, -1.0]);
 }
 
 /// ν = 1/4 of the 5 kPa that s₁ and s₂ lose together.
 #[test]
 fn returns_to_the_tension_edge() {
-    check(
-        Zone::TensionEdge,
-        Some(5.0),
-        [8.0, 7.0, -1.0],
-        [5.0, 5.0, -2.25],
-    );
-    check(
-        Zone::TensionEdge,
-        Some(5.0),
-        [8.0, 8.0, -1.0],
-        [5.0, 5.0, -2.5],
-    );
+    cut(Zone::TensionEdge, [8.0, 7.0, -1.0], [5.0, 5.0, -2.25]);
+    cut(Zone::TensionEdge, [8.0, 8.0, -1.0], [5.0, 5.0, -2.5]);
 }
 
 /// On the tension edge s₃ would be 18 − 29/4 > 5.
 #[test]
 fn returns_to_the_tension_corner() {
-    check(Zone::TensionCorner, Some(5.0), [20.0, 19.0, 18.0], [5.0; 3]);
-    check(Zone::TensionCorner, Some(5.0), [9.0; 3], [5.0; 3]);
+    cut(Zone::TensionCorner, [20.0, 19.0, 18.0], [5.0; 3]);
+    cut(Zone::TensionCorner, [9.0; 3], [5.0; 3]);
 }
 
 /// s₁ loses 10 and s₃ gains 5: s₂ loses (10 − 5)/4.
 #[test]
 fn returns_to_face_and_tension() {
     let end = [5.0, -11.25, -25.0];
-    check(Zone::FaceAndTension, Some(5.0), [15.0, -10.0, -30.0], end);
+    cut(Zone::FaceAndTension, [15.0, -10.0, -30.0], end);
 }
 
 /// The edge alone would end at s₁ = 29.5 − 35.4/2 = 11.8; s₂ between face and cut-off at 26.5.
 #[test]
 fn returns_to_the_vertex_on_the_compression_edge() {
-    check(
-        Zone::Vertex12,
-        Some(5.0),
-        [30.0, 29.0, -40.0],
-        [5.0, 5.0, -25.0],
-    );
-    check(
-        Zone::Vertex12,
-        Some(5.0),
-        [30.0, 30.0, -40.0],
-        [5.0, 5.0, -25.0],
-    );
+    cut(Zone::Vertex12, [30.0, 29.0, -40.0], [5.0, 5.0, -25.0]);
+    cut(Zone::Vertex12, [30.0, 30.0, -40.0], [5.0, 5.0, -25.0]);
 }
 
 /// The edge alone would end at s₁ = 40 − 34 = 6; s₂ between face and cut-off at −43.
 #[test]
 fn returns_to_the_vertex_on_the_extension_edge() {
-    check(
-        Zone::Vertex23,
-        Some(5.0),
-        [40.0, -38.0, -40.0],
-        [5.0, -25.0, -25.0],
-    );
-    check(
-        Zone::Vertex23,
-        Some(5.0),
-        [40.0, -40.0, -40.0],
-        [5.0, -25.0, -25.0],
-    );
+    cut(Zone::Vertex23, [40.0, -38.0, -40.0], [5.0, -25.0, -25.0]);
+    cut(Zone::Vertex23, [40.0, -40.0, -40.0], [5.0, -25.0, -25.0]);
 }
 
 /// φ = 0: s₁ − s₃ = 2c wherever the mean stress is.

@@ -278,19 +278,16 @@ impl Regularised {
 
     /// Chooses α for the next correction. What corrections with another one achieved says nothing of it.
     fn adapt_share(&mut self, is_too_small: bool) {
-        let share = if is_too_small {
+        self.share = if is_too_small && self.share < SHARES.0 {
             (self.share * FALL).min(SHARES.0)
-        } else if self.even >= SHARE_FALLS {
+        } else if !is_too_small && self.even >= SHARE_FALLS && self.share > SHARES.1 {
             (self.share / FALL).max(SHARES.1)
         } else {
             return;
         };
-        if share != self.share {
-            self.share = share;
-            self.moves = Acceleration::default();
-            self.sizes.clear();
-            self.even = 0;
-        }
+        self.moves = Acceleration::default();
+        self.sizes.clear();
+        self.even = 0;
     }
 
     /// Cosine of the angle between the last correction and this one; 0 without one.

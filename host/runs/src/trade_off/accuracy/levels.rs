@@ -185,22 +185,25 @@ mod tests {
     use crate::experiment::{Counts, Rows};
     use approx::assert_relative_eq;
 
+    fn trial(stretches: Vec<Vec<Vec<f64>>>, linear: Vec<bool>) -> Trial {
+        let rows = Rows {
+            names: vec!["f".to_owned()],
+            stretches,
+            zeros: Vec::new(),
+        };
+        Trial {
+            rows,
+            seconds: 0.0,
+            counts: Counts::default(),
+            linear,
+        }
+    }
+
     /// Runs to the value 1 with an error n^−p.
     fn levels(order: f64, divisions: &[f64]) -> Levels {
         let mut levels = Levels::default();
         for &n in divisions {
-            let rows = Rows {
-                names: vec!["f".to_owned()],
-                stretches: vec![vec![vec![1.0 - n.powf(-order)]]],
-                zeros: Vec::new(),
-            };
-            let trial = Trial {
-                rows,
-                seconds: 0.0,
-                counts: Counts::default(),
-                linear: Vec::new(),
-            };
-            levels.push(n, trial);
+            levels.push(n, trial(vec![vec![vec![1.0 - n.powf(-order)]]], Vec::new()));
         }
         levels
     }
@@ -243,18 +246,7 @@ mod tests {
         let of = |values: [f64; 3]| {
             let mut levels = Levels::default();
             for (n, value) in [1.0, 2.0, 4.0].into_iter().zip(values) {
-                let rows = Rows {
-                    names: vec!["f".to_owned()],
-                    stretches: vec![vec![vec![value]]],
-                    zeros: Vec::new(),
-                };
-                let trial = Trial {
-                    rows,
-                    seconds: 0.0,
-                    counts: Counts::default(),
-                    linear: Vec::new(),
-                };
-                levels.push(n, trial);
+                levels.push(n, trial(vec![vec![vec![value]]], Vec::new()));
             }
             levels.growth()
         };
@@ -272,18 +264,8 @@ mod tests {
         let of = |increments: [[usize; 2]; 3], is_linear: bool| {
             let mut levels = Levels::of_increments();
             for (n, phases) in [1.0, 2.0, 4.0].into_iter().zip(increments) {
-                let rows = Rows {
-                    names: vec!["f".to_owned()],
-                    stretches: phases.map(|n| vec![vec![1.0]; n]).to_vec(),
-                    zeros: Vec::new(),
-                };
-                let trial = Trial {
-                    rows,
-                    seconds: 0.0,
-                    counts: Counts::default(),
-                    linear: vec![is_linear, false],
-                };
-                levels.push(n, trial);
+                let stretches = phases.map(|n| vec![vec![1.0]; n]).to_vec();
+                levels.push(n, trial(stretches, vec![is_linear, false]));
             }
             levels.error().is_some()
         };
