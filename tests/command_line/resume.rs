@@ -242,7 +242,7 @@ fn a_run_without_any_force_resumes_to_the_same_bits() {
 #[test]
 fn a_node_that_leads_a_rigid_line_goes_on_to_the_same_bits() {
     let edits = [
-        "top = { => pole = { x = 0.0, y = 2.0 }\\ntop = {",
+        "top = { => pole = { x = 0.0, y = 2.0 }, top = {",
         r#"increments = 1500 => increments = 1500\nrigid = ["top"]"#,
         r#"line = "top", y = 0.1 => line = "pole", y = -0.1"#,
         r#"line = "top", quantity => line = "pole", quantity"#,

@@ -110,7 +110,6 @@ fn many_bodies_balance_together() {
     let finished = run(&format!(
         r#"
 analysis = "plane_strain"
-supports = [{{ line = "base", fixed = ["x", "y"] }}, {{ line = "left", fixed = ["x", "y"] }}]
 [mesh]
 origin = [0.0, 0.0]
 columns = [{columns}]
@@ -128,6 +127,12 @@ mc = {{ law = "mohr_coulomb", parameters = {{ young_modulus = 34e3, poisson_rati
 [groups]
 wall = {{ formulation = "solid", integration = "full", law = "elastic" }}
 ground = {{ formulation = "solid", integration = "full", law = "mc" }}
+[[supports]]
+line = "base"
+fixed = ["x", "y"]
+[[supports]]
+line = "left"
+fixed = ["x", "y"]
 {supports}
 [[phase]]
 name = "press"

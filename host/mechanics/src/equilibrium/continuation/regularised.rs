@@ -34,12 +34,13 @@ const FIRST: f64 = 3.0;
 const PATIENCE: usize = 4;
 /// Another Newton correction is tried after this many regularised ones in a row that halved the residual.
 const HALVINGS: usize = 2;
-/// Corrections are even, as those of a constant speed, if the cosine between them and the ratio of their sizes are
-/// at least this.
-const EVEN: (f64, f64) = (0.93, 0.8);
-/// Even corrections in a row after which α falls, and after which moves are long.
-const SHARE_FALLS: usize = 2;
-const MOVES_ARE_LONG: usize = 3;
+/// α falls after corrections of about the same direction and size: the least cosine between them, and how many in a
+/// row.
+const SHARE_FALLS: (f64, usize) = (0.93, 2);
+/// Moves are long after even ones, as those of a constant speed.
+const MOVES_ARE_LONG: (f64, usize) = (0.95, 3);
+/// Least ratio of sizes in both.
+const SAME_SIZE: f64 = 0.8;
 /// The residual rises if it grows by more than this factor, and above the tolerance.
 const JUMP: f64 = 2.0;
 /// An accelerated correction is not taken if the cosine between it and the plain one is less than this.
@@ -73,8 +74,9 @@ pub(super) struct Regularised {
     /// The last correction before acceleration, and the sizes of those since the last long move.
     last: Vec<f64>,
     sizes: Vec<f64>,
-    /// Even corrections in a row.
+    /// Even corrections in a row, and those of about the same direction and size.
     even: usize,
+    steady: usize,
     /// Corrections in a row that each halved the residual.
     halvings: usize,
     /// The last step needed them.
@@ -97,6 +99,7 @@ impl Regularised {
             last: Vec::new(),
             sizes: Vec::new(),
             even: 0,
+            steady: 0,
             halvings: 0,
             is_expected,
             since: None,
@@ -221,11 +224,16 @@ impl Regularised {
         let plain = newton.regularised_answer(&state.balance.residual, share)?;
         let size = norm(&plain);
         let (cosine, ratio) = (self.cosine(&plain), size / norm(&self.last));
-        let is_even = cosine >= EVEN.0 && (EVEN.1..=1.0 / EVEN.1).contains(&ratio);
-        self.even = if is_even { self.even + 1 } else { 0 };
+        let is_same_size = (SAME_SIZE..=1.0 / SAME_SIZE).contains(&ratio);
+        let longer = |row: usize, least: f64| {
+            let goes_on = is_same_size && cosine >= least;
+            if goes_on { row + 1 } else { 0 }
+        };
+        self.even = longer(self.even, MOVES_ARE_LONG.0);
+        self.steady = longer(self.steady, SHARE_FALLS.0);
         self.last.clone_from(&plain);
         self.sizes.push(size);
-        let (correction, length, next) = if self.even >= MOVES_ARE_LONG {
+        let (correction, length, next) = if self.even >= MOVES_ARE_LONG.1 {
             self.moves = Acceleration::default();
             self.sizes.clear();
             let correction = Correction::by(plain);
@@ -280,14 +288,14 @@ impl Regularised {
     fn adapt_share(&mut self, is_too_small: bool) {
         self.share = if is_too_small && self.share < SHARES.0 {
             (self.share * FALL).min(SHARES.0)
-        } else if !is_too_small && self.even >= SHARE_FALLS && self.share > SHARES.1 {
+        } else if !is_too_small && self.steady >= SHARE_FALLS.1 && self.share > SHARES.1 {
             (self.share / FALL).max(SHARES.1)
         } else {
             return;
         };
         self.moves = Acceleration::default();
         self.sizes.clear();
-        self.even = 0;
+        (self.even, self.steady) = (0, 0);
     }
 
     /// Cosine of the angle between the last correction and this one; 0 without one.
