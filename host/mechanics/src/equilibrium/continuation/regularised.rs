@@ -6,8 +6,8 @@
 //!   (K + α K_e) δ = r,
 //!
 //! are smaller where the body is soft, and go on in one direction. They approach equilibrium linearly;
-//! [Anderson acceleration](Acceleration) makes that faster, and so does a smaller α where corrections are even. Nothing
-//! is committed: laws see one increment from the last equilibrium.
+//! [Anderson acceleration](Acceleration) makes that faster, and so does a smaller α where corrections keep their direction
+//! and size. Nothing is committed: laws see one increment from the last equilibrium.
 //!
 //! A regularised correction is smaller than the error, so its size alone accepts nothing. If the last corrections
 //! shrink by a factor ρ < 1 each, those to come add up to ρ/(1 − ρ) times the last one, and that is held against the
@@ -22,7 +22,7 @@ use crate::equilibrium::newton::{
 use crate::settings::Settings;
 use law::Operator;
 
-/// Largest and least α. It starts from the largest, falls by a factor where corrections are even, and rises by it
+/// Largest and least α. It starts from the largest, falls by a factor where corrections are steady, and rises by it
 /// where the residual does.
 const SHARES: (f64, f64) = (0.1, 0.02);
 const FALL: f64 = 4.0;
@@ -34,8 +34,8 @@ const FIRST: f64 = 3.0;
 const PATIENCE: usize = 4;
 /// Another Newton correction is tried after this many regularised ones in a row that halved the residual.
 const HALVINGS: usize = 2;
-/// α falls after corrections of about the same direction and size: the least cosine between them, and how many in a
-/// row.
+/// α falls after steady corrections, of about the same direction and size: the least cosine between them, and how many
+/// in a row.
 const SHARE_FALLS: (f64, usize) = (0.93, 2);
 /// Moves are long after even ones, as those of a constant speed.
 const MOVES_ARE_LONG: (f64, usize) = (0.95, 3);
@@ -74,7 +74,7 @@ pub(super) struct Regularised {
     /// The last correction before acceleration, and the sizes of those since the last long move.
     last: Vec<f64>,
     sizes: Vec<f64>,
-    /// Even corrections in a row, and those of about the same direction and size.
+    /// Even corrections in a row, and steady ones.
     even: usize,
     steady: usize,
     /// Corrections in a row that each halved the residual.
